@@ -52,6 +52,10 @@ struct SceneConfig {
   bool checkMeshes = true;
   SceneLimits limits;
 
+  /// A ball touches the meshes: they get the discs that it gathers by (35 bytes for each triangle).
+  /// Without them it works more for the same force. Not recorded.
+  bool ballTool = true;
+
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.
   std::function<base::Nanos()> stopwatch;
 

@@ -214,7 +214,7 @@ std::shared_ptr<const std::vector<Triangle>> MeshDraft::shareTriangles() {
   return triples;
 }
 
-std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
+std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology, bool ballTool) {
   auto mesh = std::make_shared<MeshGeometry>();
   mesh->topology = topology;
   mesh->vertices = vertices_.share();
@@ -231,13 +231,14 @@ std::shared_ptr<MeshGeometry> MeshDraft::build(std::uint64_t topology) {
   if (hasDeformed_) return mesh;
   auto fans = std::make_shared<const geometry::Fans>(vertices, triangles, repeated);
   if (!fans->empty()) mesh->fans = std::move(fans);
+  if (ballTool) mesh->discs = std::make_shared<const geometry::DiscTree>(vertices, triangles, repeated);
   return mesh;
 }
 
-std::shared_ptr<const MeshGeometry> MeshDraft::commit(Nanos now, std::uint64_t topology) {
+std::shared_ptr<const MeshGeometry> MeshDraft::commit(Nanos now, std::uint64_t topology, bool ballTool) {
   if (triangleCount() == 0 || !current_ || shapeChanged_) {
     deformation_.restart();
-    current_ = triangleCount() > 0 ? build(topology) : nullptr;
+    current_ = triangleCount() > 0 ? build(topology, ballTool) : nullptr;
   } else {
     auto asSent = indexed_ ? triangles_.share() : current_->triangles;
     current_ = deformation_.next(current_, std::move(asSent), vertices_.share(), now);

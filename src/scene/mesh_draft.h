@@ -94,7 +94,7 @@ class MeshDraft {
 
   /// Builds the mesh with all edits; null when it has no triangles. `topology` numbers a new list of
   /// triangles; no other mesh has it. begin() must follow.
-  std::shared_ptr<const MeshGeometry> commit(Nanos now, std::uint64_t topology);
+  std::shared_ptr<const MeshGeometry> commit(Nanos now, std::uint64_t topology, bool ballTool);
   /// How long the surface of commit() should travel to its shape from `begin` on, when it travels
   /// `shortest(distance in object units)` at least; 0: it is a new one.
   Nanos travel(Nanos begin, const std::function<Nanos(double)>& shortest) const;
@@ -107,7 +107,7 @@ class MeshDraft {
   bool positionsAreUnderWay() const { return dirty_ && !shapeChanged_ && current_; }
   void grow(std::vector<Vec3f>& vertices, std::size_t size);
   std::shared_ptr<const std::vector<Triangle>> shareTriangles();
-  std::shared_ptr<MeshGeometry> build(std::uint64_t topology);
+  std::shared_ptr<MeshGeometry> build(std::uint64_t topology, bool ballTool);
 
   CopyOnWrite<Vec3f> vertices_;
   CopyOnWrite<Triangle> triangles_;  // as sent: corners may be missing

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/time.h"
+#include "geometry/disc_tree.h"
 #include "geometry/fans.h"
 #include "geometry/triangle_mesh.h"
 #include "scene/spatial_index.h"
@@ -40,6 +41,8 @@ struct MeshGeometry {
   Box boundsOnTheWay;                          ///< of all shapes that it has while it deforms
   SpatialIndex index;                          ///< over triangle ids, in object units
   std::shared_ptr<const geometry::Fans> fans;  ///< null without any, and once a vertex has moved
+  /// For a ball tool; null without one, and once a vertex has moved.
+  std::shared_ptr<const geometry::DiscTree> discs;
 
   /// All positions of vertices, as of the last publication.
   const std::vector<Vec3f>& shapeVertices() const noexcept { return target ? *target : *vertices; }

@@ -136,7 +136,7 @@ double ObjectTable::metresPerUnit(const Object& object) const {
 
 void ObjectTable::commitMesh(Object& object, Nanos now, Nanos clock, std::vector<Object*>& committed) {
   const std::uint64_t topology = object.geometry ? object.geometry->topology : 0;
-  object.geometry = object.mesh.commit(clock, ++lastTopology_);
+  object.geometry = object.mesh.commit(clock, ++lastTopology_, config_.ballTool);
   committed.push_back(&object);  // before anything that may fail: it must begin
   object.stateChanged = true;
   queue(object);

@@ -26,25 +26,20 @@ constexpr double kWiden = 1 + 1e-6;         // covers the rounding of queries th
 constexpr double kFanError_m = 1e-7;
 constexpr double kFanErrorShare = 5e-4;
 constexpr double kSmallestGather_m = 10e-6;
-constexpr double kHalfWay = 0.6;  // half of the way of a tick, and what it bends aside
-constexpr double kBallWay = 0.7;  // the same for a ball, whose last steps may lead beyond its rest
+constexpr double kSmallestWay_m = 1e-6;
+constexpr double kHalfWay = 0.6;   // half of the way of a tick, and what it bends aside
+constexpr double kBallWay = 0.7;   // the same for a ball, whose last steps may lead beyond its rest
+constexpr double kAside = 0.05;    // of a way that is gathered: how far a ball may leave it
+constexpr double kWholeWay = 1.1;  // of a tick, and a little more
+constexpr double kShortestWay = 0.01;
+constexpr int kFewAlongWay = 64;  // triangles: then a ball of the same margin fits, too
+constexpr double kManyWays = 4;   // a reserve for fewer is no less work than to gather each
 constexpr int kReuseLimit = 32;   // reuse the cached facets up to this count instead of querying again
 
 scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   scene::Corners out{t * c.a, t * c.b, t * c.c};
   if (mirrored) std::swap(out.b, out.c);
   return out;
-}
-
-// Parameter, at most 1, at which p + t d leaves the ball. p is inside.
-double exitOf(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) {
-  const Vec3 m = p - centre;
-  if ((m + d).squaredNorm() <= radius * radius) return 1;
-  const double a = d.squaredNorm();
-  const double b = m.dot(d);
-  const double c = m.squaredNorm() - radius * radius;
-  const double root = std::sqrt(std::max(0.0, b * b - a * c));
-  return std::clamp((root - b) / a, 0.0, 1.0);
 }
 
 }  // namespace
@@ -167,7 +162,7 @@ bool ContactQuery::shorten(const Vec3& p, Vec3& g) const noexcept {
   if ((p - freeFrom_).norm() >= freeTravel_) {
     g = p;
   } else {
-    g = p + exitOf(p, g - p, freeFrom_, freeTravel_) * (g - p);
+    g = p + exitOfBall(p, g - p, freeFrom_, freeTravel_) * (g - p);
   }
   return true;
 }
@@ -297,12 +292,16 @@ bool ContactQuery::viewJumped(const PlacedObject& placed) const noexcept {
   return !near.empty() && scene::longestMove(places[0], places[1], near) > kLongestMotion_m;
 }
 
+bool ContactQuery::isUneven(const PlacedObject& placed) noexcept {
+  constexpr double kUneven = 0.8;
+  return placed.stretchAlong.minCoeff() <= kUneven * placed.stretch;
+}
+
 // The index is asked for a ball in the object's frame, which is an ellipsoid in the device frame. Of the
 // triangles of an object that is scaled unevenly, most are beyond the box around it.
 bool ContactQuery::mayReach(const PlacedObject& placed, std::uint32_t triangle, const Vec3& inObject,
                             double reach_m) noexcept {
-  constexpr double kUneven = 0.8;
-  if (placed.stretchAlong.minCoeff() > kUneven * placed.stretch) return true;
+  if (!isUneven(placed)) return true;
   const scene::Corners k = placed.state->mesh->corners(triangle, now_.time);
   const Vec3 low = k.a.cwiseMin(k.b).cwiseMin(k.c);
   const Vec3 high = k.a.cwiseMax(k.b).cwiseMax(k.c);
@@ -312,14 +311,15 @@ bool ContactQuery::mayReach(const PlacedObject& placed, std::uint32_t triangle, 
   return false;
 }
 
-// The levels of the fans of one object within a ball.
+// The levels of the fans of one object near a way.
 class ContactQuery::JoinedFans {
  public:
-  JoinedFans(const PlacedObject& placed, Nanos now, const Vec3& centre, double reach_m,
+  JoinedFans(const PlacedObject& placed, Nanos now, const Vec3& from, const Vec3& to, double reach_m,
              double toolRadius_m) noexcept
       : mesh_(*placed.state->mesh),
         now_(now),
-        centre_(centre),
+        from_(from),
+        to_(to),
         reach_(reach_m * placed.stretch),
         error_((kFanError_m + kFanErrorShare * toolRadius_m) / std::max(placed.metresPerUnit, 1e-300)) {}
 
@@ -346,7 +346,8 @@ class ContactQuery::JoinedFans {
     fan_ = fan;
     level_ = 0;
     if (fan < 0) return;
-    const double distance = (mesh_.vertex(mesh_.fans->apexOf(fan), now_) - centre_).norm();
+    const Vec3 apex = mesh_.vertex(mesh_.fans->apexOf(fan), now_);
+    const double distance = std::max((apex - from_).norm(), (apex - to_).norm());
     level_ = mesh_.fans->levelFor(fan, distance + reach_, error_);
     if (level_ > 0) here_.reset();
     any_ = any_ || level_ > 0;
@@ -354,7 +355,7 @@ class ContactQuery::JoinedFans {
 
   const scene::MeshGeometry& mesh_;
   Nanos now_;
-  Vec3 centre_;
+  Vec3 from_, to_;
   double reach_;
   double error_;
   int fan_ = -1;
@@ -380,6 +381,7 @@ const Facet* ContactQuery::facetOf(const FacetCache::TriangleId& id) const noexc
   if (memo.generation != generation_ || memo.state != placed.state || memo.facet.triangle != id.triangle ||
       memo.level != id.level) {
     memo.generation = 0;
+    if (!keepsFacets_) work_ += kFacetVisit;
     if (!makeFacet(cornersOf(id), placed.skin, memo.facet)) return nullptr;
     memo.facet.triangle = id.triangle;
     memo.facet.radius = placed.radius;
@@ -411,16 +413,41 @@ void ContactQuery::estimateRoom(double radius) noexcept {
 }
 
 // How much a ball tool gathers at once, as far as is known, also from the ticks before.
-void ContactQuery::learnWhatFits(double radius) noexcept {
+void ContactQuery::learnWhatFits(const Vec3& centre, double radius, bool overflowed) noexcept {
   constexpr int kFew = FacetCache::kMaxTriangles / 3;
   // Not where other gathers spent the work of the tick.
-  if (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles) {
+  if (overflowed || (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles)) {
     fits_m_ = std::max(0.5 * radius, kSmallestGather_m);
+    if (canGatherFansAlongWays()) fits_m_ = kSmallestGather_m;
+    while (fits_m_ > kSmallestGather_m && !discsFit(centre, fits_m_))
+      fits_m_ = std::max(0.5 * fits_m_, kSmallestGather_m);
     reserve_m_ = std::min(reserve_m_, fits_m_);
     countBefore_ = FacetCache::kMaxTriangles;  // tells nothing of how few a smaller one leaves out
   } else if (cache_.complete() && cache_.size() < kFew && radius >= 0.5 * fits_m_) {
     fits_m_ *= 1.5;
   }
+}
+
+// Balls that fit beside fans would have to be found by trying.
+bool ContactQuery::canGatherFansAlongWays() const noexcept {
+  const auto end = objects_.begin() + objectCount_;
+  return std::all_of(objects_.begin(), end, [this](const PlacedObject& o) { return hasDiscs(o); }) &&
+         std::any_of(objects_.begin(), end,
+                     [](const PlacedObject& o) { return o.state->mesh->fans != nullptr; });
+}
+
+// To find that out is far less work than to gather what then does not fit.
+bool ContactQuery::discsFit(const Vec3& centre, double radius) noexcept {
+  std::size_t all = 0;
+  for (int i = 0; i < objectCount_; ++i) {
+    const PlacedObject& placed = object(i);
+    if (!hasDiscs(placed) || isPassable(i)) continue;
+    int groups = 0;
+    all += placed.state->mesh->discs->findNear(placed.T_object_device * centre, Vec3::Zero(),
+                                               (radius + placed.radius) * placed.stretch, places_, groups);
+    work_ += kBoxVisit * groups;
+  }
+  return all <= places_.size();
 }
 
 // A ball that slides over a surface meets as many triangles with any reserve; with a small one, no tick
@@ -443,45 +470,110 @@ void ContactQuery::adaptReserve() noexcept {
 }
 
 bool ContactQuery::gather(const Vec3& centre, double radius) noexcept {
-  cache_.restart(centre, radius);
-  gatheredBefore_ = true;
-  joinedFans_ = false;
   if (isUnfit(centre, radius)) {
+    cache_.restart(centre, Vec3::Zero(), radius);
+    gatheredBefore_ = true;
+    joinedFans_ = false;
     cache_.invalidate();
     return false;
   }
+  bool overflowed = false;
+  gatherNear(centre, Vec3::Zero(), radius, overflowed);
+  if (keepsFacets_) estimateRoom(radius);
+  // Of what a ball is to pass nothing is here: that tells nothing of the next gathers.
+  if (!keepsFacets_ && passable_ == 0) learnWhatFits(centre, radius, overflowed);
+  if (radius == reserve_m_ && cache_.complete() && passable_ == 0) adaptReserve();
+  if (!cache_.complete() && !workSpent())
+    unfit_[static_cast<std::size_t>(unfitCount_++ % kMaxUnfit)] = {centre, std::min(radius, 2 * fits_m_)};
+  return cache_.complete();
+}
+
+void ContactQuery::gatherNear(const Vec3& from, const Vec3& way, double radius, bool& overflowed) noexcept {
+  cache_.restart(from, way, radius);
+  gatheredBefore_ = true;
+  joinedFans_ = false;
+  // Beside fans, balls are gathered as if there were no discs: the levels follow from what they held.
+  const bool byDiscs = !way.isZero(0) || !gathersBalls();
   bool reusable = true;
   for (int i = 0; i < objectCount_ && cache_.complete(); ++i) {
     const PlacedObject& placed = object(i);
     gatheredFrom_[static_cast<std::size_t>(i)] = placed.state;
     if (isPassable(i)) continue;
     reusable = reusable && placed.atRest && !placed.deformed;
-    const scene::MeshGeometry& mesh = *placed.state->mesh;
-    const Vec3 inObject = placed.T_object_device * centre;
     const double reach = radius + placed.radius + 4 * placed.skin;
-    std::optional<JoinedFans> fans;
-    if (mesh.fans && !placed.deformed) fans.emplace(placed, now_.time, inObject, reach, toolRadius_);
-    mesh.index.visitNear(inObject, reach * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
-      FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
-      if (fans && !fans->join(id)) {
-        ++work_;
-      } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, reach)) {
-        addToCache(id);
-      }
-      if (workSpent()) cache_.invalidate();
-      return cache_.complete();
-    });
-    joinedFans_ = joinedFans_ || (fans && fans->any());
+    if (byDiscs && hasDiscs(placed)) {
+      overflowed = !gatherByDiscs(i, from, way, reach);
+    } else {
+      gatherByIndex(i, from, way, reach);
+    }
   }
-  if (keepsFacets_) estimateRoom(radius);
-  // Of what a ball is to pass nothing is here: that tells nothing of the next gathers.
-  if (!keepsFacets_ && passable_ == 0) learnWhatFits(radius);
-  if (radius == reserve_m_ && cache_.complete() && passable_ == 0) adaptReserve();
   gatheredCount_ = objectCount_;
   gatheredGeneration_ = reusable ? generation_ : 0;
-  if (!cache_.complete() && !workSpent())
-    unfit_[static_cast<std::size_t>(unfitCount_++ % kMaxUnfit)] = {centre, radius};
-  return cache_.complete();
+}
+
+// The index knows no ways: around the middle of this one.
+void ContactQuery::gatherByIndex(int i, const Vec3& from, const Vec3& way, double reach) noexcept {
+  const PlacedObject& placed = object(i);
+  const scene::MeshGeometry& mesh = *placed.state->mesh;
+  const Vec3 start = placed.T_object_device * from;
+  const Vec3 end = placed.T_object_device * Vec3(from + way);
+  const Vec3 inObject = 0.5 * (start + end);
+  const double around = reach + 0.5 * way.norm();
+  std::optional<JoinedFans> fans;
+  if (mesh.fans && !placed.deformed) fans.emplace(placed, now_.time, start, end, reach, toolRadius_);
+  mesh.index.visitNear(inObject, around * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
+    FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
+    if (fans && !fans->join(id)) {
+      ++work_;
+    } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, around)) {
+      addToCache(id);
+    }
+    if (workSpent()) cache_.invalidate();
+    return cache_.complete();
+  });
+  joinedFans_ = joinedFans_ || (fans && fans->any());
+}
+
+// False when they do not fit.
+bool ContactQuery::gatherByDiscs(int i, const Vec3& from, const Vec3& way, double reach) noexcept {
+  const PlacedObject& placed = object(i);
+  const scene::MeshGeometry& mesh = *placed.state->mesh;
+  const geometry::DiscTree& discs = *mesh.discs;
+  const Vec3 start = placed.T_object_device * from;
+  const Vec3 along = placed.T_object_device.linear() * way;
+  std::optional<JoinedFans> fans;
+  if (mesh.fans) fans.emplace(placed, now_.time, start, start + along, reach, toolRadius_);
+  const geometry::Mat3 turn = placed.T_object_device.linear().transpose();
+  const double rounding = placed.metresPerUnit * discs.rounding();
+  int groups = 0;
+  const std::size_t count = discs.findNear(start, along, reach * kWiden * placed.stretch, places_, groups);
+  work_ += kBoxVisit * groups;
+  if (count > places_.size()) {
+    cache_.invalidate();
+    return false;
+  }
+  for (std::size_t k = 0; k < count && cache_.complete(); ++k) {
+    const std::uint32_t place = places_[k];
+    FacetCache::TriangleId id{discs.triangleAt(place), static_cast<std::int16_t>(i), 0};
+    if (fans && !fans->join(id)) {
+      ++work_;
+      continue;
+    }
+    if (id.level > 0) {
+      addToCache(id);
+      continue;
+    }
+    const geometry::DiscTree::Disc disc = discs.discAt(place);
+    work_ += kDiscVisit;
+    cache_.add(id,
+               {placed.T_device_object * disc.centre.cast<double>(),
+                kWiden * placed.metresPerUnit * static_cast<double>(disc.radius),
+                (turn * disc.normal.cast<double>()).normalized()},
+               placed.skin, rounding);
+  }
+  joinedFans_ = joinedFans_ || (fans && fans->any());
+  if (workSpent()) cache_.invalidate();
+  return cache_.complete() || workSpent();
 }
 
 // Deforming facets of a point tool count at any distance: they may have come from farther away.
@@ -494,12 +586,27 @@ void ContactQuery::addToCache(const FacetCache::TriangleId& id) noexcept {
   }
   const Ball ball = ballAround(id);
   // The boxes of tilted triangles reach farther than they do. Deforming ones may have come from there.
-  if (!placed.deformed && !ball.isWithin(cache_.reach() + placed.radius + 4 * placed.skin, cache_.centre())) {
+  if (!placed.deformed &&
+      !ball.isWithin(cache_.reach() + placed.radius + 4 * placed.skin, cache_.nearestOfWay(ball.centre))) {
     work_ += kBoxVisit;
     return;
   }
   work_ += kBallVisit;
   cache_.add(id, ball.centre, ball.radius, placed.skin);
+}
+
+bool ContactQuery::hasDiscs(const PlacedObject& placed) const noexcept {
+  return !keepsFacets_ && placed.state->mesh->discs && !placed.deformed && !isUneven(placed);
+}
+
+// Without discs, and beside fans, whose levels follow from the ball, as long as one fits.
+bool ContactQuery::gathersBalls() const noexcept {
+  if (keepsFacets_) return true;
+  const bool ballsFit = fits_m_ > kSmallestGather_m;
+  for (int i = 0; i < objectCount_; ++i) {
+    if (!isPassable(i) && (!hasDiscs(object(i)) || (ballsFit && object(i).state->mesh->fans))) return true;
+  }
+  return false;
 }
 
 // Of the three corners, only their middle is placed on the device.
@@ -514,7 +621,7 @@ ContactQuery::Ball ContactQuery::ballAround(const FacetCache::TriangleId& id) co
 
 // A fast tick gathers too many for the slow ticks after it.
 bool ContactQuery::isReusable(double radius) const noexcept {
-  return cache_.size() <= kReuseLimit || cache_.reach() <= 2 * radius;
+  return cache_.size() <= kReuseLimit || cache_.extent() <= 2 * radius;
 }
 
 bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
@@ -524,6 +631,19 @@ bool ContactQuery::ensureGathered(const Vec3& centre, double radius) noexcept {
   if ((!gatheredBefore_ || joinedFans_) && reserve_m_ > radius && gather(centre, reserve_m_)) return true;
   if (joinedFans_ && gather(centre, 2 * radius)) return true;
   return gather(centre, radius);
+}
+
+// A ball is near few of the triangles around the middle of its way.
+bool ContactQuery::ensureWayGathered(const Vec3& from, const Vec3& way, double margin) noexcept {
+  const double around = 0.5 * way.norm() + margin;
+  if (isReusable(std::max(around, reserve_m_)) && cache_.covers(from, from + way)) return true;
+  if (!gatheredBefore_ && reserve_m_ > kManyWays * around && gather(from + 0.5 * way, reserve_m_))
+    return true;
+  bool overflowed = false;
+  gatherNear(from, way, margin, overflowed);
+  if (cache_.complete() && cache_.size() < kFewAlongWay && passable_ == 0)
+    fits_m_ = std::max(fits_m_, 2 * kSmallestGather_m);
+  return cache_.complete();
 }
 
 void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
@@ -538,6 +658,14 @@ void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) no
   const double length = way.norm();
   const double needed = kHalfWay * length + margin;
   if (!keepsFacets_) {
+    if (!gathersBalls()) {
+      double share = kWholeWay;
+      while (!ensureWayGathered(p, share * way, share * (kAside * length + margin)) && !workSpent() &&
+             share > kShortestWay) {
+        share *= 0.5;
+      }
+      return;
+    }
     // Around the middle: the triangles that it reaches grow with the radius more than with the way.
     const double around = kBallWay * length + margin;
     if (around > fits_m_ || !ensureGathered(p + 0.5 * way, around))
@@ -677,7 +805,10 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
   }
   const double touching = radius_ + 2 * cache_.maxSkin();
   const auto considerNear = [&](const Vec3& way) {
-    for (const int i : cache_.trianglesNear(way, touching, normals())) {
+    if (workSpent()) return false;
+    const auto near = cache_.trianglesNear(way, touching, discs());
+    countScans();
+    for (const int i : near) {
       if (workSpent()) return false;
       considerGathered(i, path, only, hit, found);
     }
@@ -751,13 +882,17 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
 bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only,
                                ObjectHit& hit) noexcept {
   const double length = d.norm();
-  const double smallestStep = std::min(1.0 / 64, 2 * fits_m_ / length);
+  const double smallestStep = std::min(1.0 / 64, 2 * (gathersBalls() ? fits_m_ : kSmallestWay_m) / length);
   double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, smallestStep));
   while (begin < end) {
-    const double longest_m = std::min({longestStep_m_, 2 * roomyReach_m_, 2 * fits_m_});
+    const bool byWay = !gathersBalls();
+    const double longest_m =
+        byWay ? longestStep_m_ : std::min({longestStep_m_, 2 * roomyReach_m_, 2 * fits_m_});
     step = std::min({step, end - begin, std::max(longest_m / length, smallestStep)});
-    const double middle = begin + 0.5 * step;
-    const bool fits = ensureGathered(p + middle * d, 0.5 * step * length * kWiden);
+    const bool fits =
+        byWay ? ensureWayGathered(p + begin * d, step * d,
+                                  kAside * step * length + std::min(kSmallestGather_m, longestStep_m_))
+              : ensureGathered(p + (begin + 0.5 * step) * d, 0.5 * step * length * kWiden);
     if (!fits && step > smallestStep && !workSpent()) {
       step *= 0.25;
       longestStep_m_ = step * length;
@@ -775,7 +910,7 @@ bool ContactQuery::castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHi
   const Vec3 d = g - p;
   double free = 0;
   if (cache_.covers(p, 0)) {
-    free = std::min(share, exitOf(p, d, cache_.centre(), cache_.reach()));
+    free = std::min(share, cache_.exitOf(p, d));
     if (castGathered({p, d, 0, free}, -1, hit)) return true;
     if (free == share) return false;
   }
@@ -795,7 +930,7 @@ bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g
 bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   if (!isGathered(p)) return cast(p, g, hit);
   const Vec3 d = g - p;
-  return castGathered({p, d, 0, exitOf(p, d, cache_.centre(), cache_.reach())}, -1, hit);
+  return castGathered({p, d, 0, cache_.exitOf(p, d)}, -1, hit);
 }
 
 bool ContactQuery::castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {

@@ -26,8 +26,8 @@ using geometry::Affine;
 
 /// Parts of an object this near to the tool decide whether its move is a jump.
 inline constexpr double kNear_m = 0.050;
-/// Triangles that a tick examines: for a ball, two that it gathers count as one, and four that are out of
-/// reach. A count and not a time, so that the clock never changes a force.
+/// Triangles that a tick examines; of a ball also what takes a part of that time. A count and not a time, so
+/// that the clock never changes a force.
 inline constexpr int kMaxVisits = 8192;
 using geometry::kGapTolerance_m;
 using geometry::kLargestGapTolerance_m;
@@ -136,7 +136,7 @@ class ContactQuery {
   /// True when an object is left out because it appeared around the tool.
   bool isEnclosed() const noexcept { return enclosingCount_ > 0; }
 
-  /// Gathers the facets that a tool inside the ball can touch, so that casts inside it need no index. False
+  /// Gathers the facets that a tool inside a ball can touch, so that casts inside it need no index. False
   /// when they exceed the storage; casts then use the index.
   bool gather(const Vec3& centre, double radius) noexcept;
   /// As gather(), but reuses facets gathered before, also in an earlier tick, if they cover the ball. A ball
@@ -147,12 +147,12 @@ class ContactQuery {
   /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
   /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
   void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;
+  /// Whether it gathers what is around the middle of a way, and not what is along it.
+  bool gathersBalls() const noexcept;
   /// Radius in which there are some dozens of facets, where the last ones were gathered. For a ball tool: its
   /// reserve.
   double roomyReach() const noexcept { return keepsFacets_ ? roomyReach_m_ : reserve_m_; }
-  bool isGathered(const Vec3& p) const noexcept {
-    return cache_.complete() && (p - cache_.centre()).squaredNorm() < 0.64 * cache_.reach() * cache_.reach();
-  }
+  bool isGathered(const Vec3& p) const noexcept { return cache_.isInside(p); }
   /// Calls visit(facet) for every gathered facet within `distance` of p and possibly for others. The
   /// reference is valid until the next visit.
   template <class Visit>
@@ -205,9 +205,13 @@ class ContactQuery {
  private:
   static constexpr int kMaxObjects = 64;
   static constexpr int kMemoBits = 10;
-  static constexpr int kVisit = 16;
-  static constexpr int kBallVisit = 8;
-  static constexpr int kBoxVisit = 4;
+  // What a tick examines, in sixteenths of a cast at one facet.
+  static constexpr int kVisit = 16;      // a triangle of a point tool
+  static constexpr int kBallVisit = 6;   // one that a ball gathers by the index
+  static constexpr int kDiscVisit = 2;   // one that it gathers by its disc; a disc that is made
+  static constexpr int kFacetVisit = 4;  // a facet that a ball makes
+  static constexpr int kBoxVisit = 4;    // one that its box or its distance rules out; eight tested in a tree
+  static constexpr int kScansOfOne = 6;  // discs that a cast looks at, for a sixteenth
   static constexpr int kMaxUnfit = 8;
   static constexpr double kReserveShare = 0.2;  // of the tool radius, that is gathered in reserve at most
 
@@ -251,7 +255,9 @@ class ContactQuery {
     return (passable_ >> static_cast<unsigned>(object) & 1U) != 0;
   }
   void estimateRoom(double radius) noexcept;
-  void learnWhatFits(double radius) noexcept;
+  void learnWhatFits(const Vec3& centre, double radius, bool overflowed) noexcept;
+  bool discsFit(const Vec3& centre, double radius) noexcept;
+  bool canGatherFansAlongWays() const noexcept;
   void adaptReserve() noexcept;
   bool isUnfit(const Vec3& centre, double radius) const noexcept;
   void compareWithBefore(PlacedObject& placed) const noexcept;
@@ -262,10 +268,20 @@ class ContactQuery {
   scene::Corners cornersOf(const FacetCache::TriangleId& id) const noexcept;
   const Facet* facetOf(const FacetCache::TriangleId& id) const noexcept;
   Ball ballAround(const FacetCache::TriangleId& id) const noexcept;
+  void gatherNear(const Vec3& from, const Vec3& way, double radius, bool& overflowed) noexcept;
+  void gatherByIndex(int object, const Vec3& from, const Vec3& way, double reach) noexcept;
+  bool gatherByDiscs(int object, const Vec3& from, const Vec3& way, double reach) noexcept;
+  bool ensureWayGathered(const Vec3& from, const Vec3& way, double margin) noexcept;
+  static bool isUneven(const PlacedObject& placed) noexcept;
+  bool hasDiscs(const PlacedObject& placed) const noexcept;
   void addToCache(const FacetCache::TriangleId& id) noexcept;
-  auto normals() const noexcept {
-    return [this](const FacetCache::TriangleId& id) { return discAround(cornersOf(id)).normal; };
+  auto discs() const noexcept {
+    return [this](const FacetCache::TriangleId& id) {
+      work_ += kDiscVisit;
+      return discAround(cornersOf(id));
+    };
   }
+  void countScans() noexcept { work_ += cache_.takeScans() / kScansOfOne; }
   static bool endUnexamined(const Path& path, ObjectHit& hit) noexcept;
   bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
   void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
@@ -319,10 +335,10 @@ class ContactQuery {
   std::uint64_t generation_ = 1;  // of all that is kept from tick to tick
   mutable std::array<MemoFacet, 1U << kMemoBits> facetMemo_;
   bool overflowed_ = false;
-  // Of this tick, besides casts: kVisit for a triangle, kBallVisit for one that a ball tool gathers,
-  // kBoxVisit for one that its box rules out, 1 for one that is joined to another.
-  int work_ = 0;
+  // Of this tick, besides casts; 1 for a triangle that is joined to another.
+  mutable int work_ = 0;
   mutable int facetCasts_ = 0;
+  std::array<std::uint32_t, FacetCache::kMaxTriangles> places_;  // of discs
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
   bool pointTool_ = false;      // casts move the centre of the tool
 };
@@ -340,7 +356,9 @@ void ContactQuery::forEachGathered(const Vec3& p, double distance, Visit&& visit
     return;
   }
   cache_.moveTo(p);
-  for (const int i : cache_.trianglesNear(Vec3::Zero(), distance, normals())) {
+  const auto near = cache_.trianglesNear(Vec3::Zero(), distance, discs());
+  countScans();
+  for (const int i : near) {
     const Facet* const f = facetOf(cache_.triangle(i));
     if (f != nullptr) visit(*f);
   }

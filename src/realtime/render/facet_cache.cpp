@@ -12,13 +12,27 @@ constexpr float kSingleRounding = 1e-6F;  // relative; eight times that of one o
 
 }  // namespace
 
-void FacetCache::restart(const Vec3& centre, double reach) noexcept {
-  centre_ = toolPosition_ = centre;
+double exitOfBall(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) noexcept {
+  const Vec3 m = p - centre;
+  if ((m + d).squaredNorm() <= radius * radius) return 1;
+  const double a = d.squaredNorm();
+  const double b = m.dot(d);
+  const double c = m.squaredNorm() - radius * radius;
+  const double root = std::sqrt(std::max(0.0, b * b - a * c));
+  return std::clamp((root - b) / a, 0.0, 1.0);
+}
+
+void FacetCache::restart(const Vec3& from, const Vec3& way, double reach) noexcept {
+  from_ = from;
+  way_ = way;
+  centre_ = toolPosition_ = from + 0.5 * way;
   reach_ = reach;
   complete_ = true;
   count_ = 0;
   maxSkin_ = 0;
   maxRadius_ = 0;
+  rounding_ = 0;
+  knowsAll_ = true;
   travel_ = 0;
   nearDistance_ = -1;
 }
@@ -52,11 +66,41 @@ void FacetCache::add(const TriangleId& id, const Vec3& middle, double radius, do
   const auto i = static_cast<std::size_t>(count_++);
   triangles_[i] = id;
   supportPlanes_[i] = {Vec3::Zero(), 0};
-  const Vec3f centre = (middle - centre_).cast<float>();
-  for (std::size_t k = 0; k < 3; ++k) discCentres_[k][i] = centre[static_cast<int>(k)];
-  discRadii_[i] = static_cast<float>(radius) + kSingleRounding * centre.cwiseAbs().maxCoeff();
-  discNormals_[i].x() = std::numeric_limits<float>::quiet_NaN();
+  set(i, {middle, radius, Vec3::Constant(std::numeric_limits<double>::quiet_NaN())});
+  knowsAll_ = false;
   maxSkin_ = std::max(maxSkin_, skin);
+}
+
+void FacetCache::add(const TriangleId& id, const Disc& disc, double skin, double rounding) noexcept {
+  if (count_ == kMaxTriangles) return invalidate();
+  const auto i = static_cast<std::size_t>(count_++);
+  triangles_[i] = id;
+  supportPlanes_[i] = {Vec3::Zero(), 0};
+  set(i, disc);
+  rounding_ = std::max(rounding_, rounding);
+  maxSkin_ = std::max(maxSkin_, skin);
+}
+
+void FacetCache::set(std::size_t i, const Disc& disc) noexcept {
+  const Vec3f centre = (disc.centre - centre_).cast<float>();
+  for (std::size_t k = 0; k < 3; ++k) {
+    discCentres_[k][i] = centre[static_cast<int>(k)];
+    discNormals_[k][i] = static_cast<float>(disc.normal[static_cast<int>(k)]);
+  }
+  discRadii_[i] = static_cast<float>(disc.radius) + kSingleRounding * centre.cwiseAbs().maxCoeff();
+}
+
+double FacetCache::exitOf(const Vec3& p, const Vec3& d) const noexcept {
+  if (way_.isZero(0)) return exitOfBall(p, d, centre_, reach_);
+  if (covers(p + d, 0)) return 1;
+  // What is covered is convex.
+  constexpr int kHalvings = 12;
+  double inside = 0;
+  double step = 0.5;
+  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
+    if (covers(p + (inside + step) * d, 0)) inside += step;
+  }
+  return inside;
 }
 
 FacetCache::Reach FacetCache::reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept {
@@ -64,7 +108,7 @@ FacetCache::Reach FacetCache::reachOf(const Vec3& p, const Vec3& d, double dista
   reach.from = (p - centre_).cast<float>();
   reach.way = d.cast<float>();
   reach.length2 = reach.way.squaredNorm();
-  reach.distance = static_cast<float>(distance) +
+  reach.distance = static_cast<float>(distance + rounding_) +
                    kSingleRounding * (reach.from.cwiseAbs() + reach.way.cwiseAbs()).maxCoeff();
   reach.distance2 = reach.distance * reach.distance;
   return reach;
@@ -73,8 +117,9 @@ FacetCache::Reach FacetCache::reachOf(const Vec3& p, const Vec3& d, double dista
 // Whether the path comes near the disc around triangle i. True where a number is not one.
 bool FacetCache::reaches(const Reach& reach, std::size_t i) const noexcept {
   const Vec3f offset = reach.from - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
-  const float up = discNormals_[i].dot(offset);
-  const float rise = discNormals_[i].dot(reach.way);
+  const Vec3f normal(discNormals_[0][i], discNormals_[1][i], discNormals_[2][i]);
+  const float up = normal.dot(offset);
+  const float rise = normal.dot(reach.way);
   const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0;
   const float offset2 = offset.squaredNorm();
   const float inPlane = offset.dot(reach.way) - up * rise;
@@ -85,6 +130,32 @@ bool FacetCache::reaches(const Reach& reach, std::size_t i) const noexcept {
   const float room2 = reach.distance2 + rounding - lowest * lowest;
   const float farthest = discRadii_[i] + std::sqrt(std::max(0.0F, room2));
   return !(room2 < 0) && !(aside2 - farthest * farthest > rounding);
+}
+
+// reaches() for all of them, whose normals are known: above 0 where it is false.
+void FacetCache::missDiscs(const Reach& reach) noexcept {
+  const auto count = static_cast<std::size_t>(count_);
+  const auto& [cx, cy, cz] = discCentres_;
+  const auto& [nx, ny, nz] = discNormals_;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = reach.from.x() - cx[i];
+    const float y = reach.from.y() - cy[i];
+    const float z = reach.from.z() - cz[i];
+    const float up = nx[i] * x + ny[i] * y + nz[i] * z;
+    const float rise = nx[i] * reach.way.x() + ny[i] * reach.way.y() + nz[i] * reach.way.z();
+    const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0.0F;
+    const float offset2 = x * x + y * y + z * z;
+    const float inPlane = x * reach.way.x() + y * reach.way.y() + z * reach.way.z() - up * rise;
+    const float wayInPlane2 = reach.length2 - rise * rise;
+    const float along = wayInPlane2 > 0 ? -inPlane / wayInPlane2 : 0.0F;
+    const float share = std::min(std::max(along, 0.0F), 1.0F);
+    const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
+    const float rounding = kSingleRounding * (offset2 + reach.length2 + reach.distance2);
+    const float room2 = reach.distance2 + rounding - lowest * lowest;
+    const float farthest = discRadii_[i] + std::sqrt(std::max(0.0F, room2));
+    const float beyond = aside2 - farthest * farthest - rounding;
+    misses_[i] = room2 < 0 ? 1.0F : beyond;
+  }
 }
 
 // By how much the path misses the ball around each triangle (square metres).
@@ -109,17 +180,20 @@ void FacetCache::missBalls(const Reach& reach) noexcept {
 // The plane through the point of disc i nearest to p, relative to centre_, with the disc on its back.
 FacetCache::NearPlane FacetCache::planeBefore(std::size_t i, const Vec3f& p) const noexcept {
   const Vec3f offset = p - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
-  const Vec3f up = discNormals_[i].dot(offset) * discNormals_[i];
+  const Vec3f normal(discNormals_[0][i], discNormals_[1][i], discNormals_[2][i]);
+  const Vec3f up = normal.dot(offset) * normal;
   const Vec3f aside = offset - up;
   const float length = aside.norm();
   const Vec3f away = length > discRadii_[i] ? Vec3f(up + (1 - discRadii_[i] / length) * aside) : up;
   const float distance = away.norm();
-  const Vec3f normal = distance > 0 ? Vec3f(away / distance) : Vec3f(Vec3f::Zero());
-  return {normal, distance - kSingleRounding * (4 * offset.norm() + p.norm())};
+  const Vec3f towards = distance > 0 ? Vec3f(away / distance) : Vec3f(Vec3f::Zero());
+  return {towards,
+          distance - kSingleRounding * (4 * offset.norm() + p.norm()) - static_cast<float>(rounding_)};
 }
 
 void FacetCache::makeNearPlanes() noexcept {
   const Vec3f from = (nearCentre_ - centre_).cast<float>();
+  scans_ += 4 * nearCount_;  // not several at once
   for (std::size_t k = 0; k < static_cast<std::size_t>(nearCount_); ++k) {
     const NearPlane plane = planeBefore(near_[k], from);
     for (std::size_t axis = 0; axis < 3; ++axis) nearNormals_[axis][k] = plane.normal[static_cast<int>(axis)];
@@ -135,6 +209,7 @@ std::span<const std::uint16_t> FacetCache::nearPlanesMet(const Vec3& d, double d
                       kSingleRounding * (static_cast<float>(distance) + begin.norm() + end.norm());
   const auto count = static_cast<std::size_t>(nearCount_);
   const auto& [x, y, z] = nearNormals_;
+  scans_ += nearCount_ / 2;
   // By how much the path misses the tool's reach of a disc, at least.
   for (std::size_t k = 0; k < count; ++k) {
     const float here = x[k] * begin.x() + y[k] * begin.y() + z[k] * begin.z();

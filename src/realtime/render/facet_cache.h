@@ -1,4 +1,4 @@
-// The facets that a tool inside a ball around the proxy can touch, in fixed storage.
+// The facets that a tool inside a ball around the proxy, or near its way, can touch, in fixed storage.
 //
 // Point tool: keeps the facets themselves. A path first discards the faces whose plane or whose ball it does
 // not come near, which leaves few. Ball tool: many triangles lie within its radius and few touch it. It keeps
@@ -6,16 +6,21 @@
 // exact facets are made only for what neither rules out.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "realtime/render/facet.h"
 
 namespace hapticd::realtime {
 
 using geometry::Vec3f;
+
+/// Parameter, at most 1, at which p + t d leaves a ball. p is inside.
+double exitOfBall(const Vec3& p, const Vec3& d, const Vec3& centre, double radius) noexcept;
 
 /// Servo thread: noexcept, no allocation.
 class FacetCache {
@@ -33,22 +38,40 @@ class FacetCache {
 
   explicit FacetCache(double toolRadius_m) noexcept : toolRadius_(toolRadius_m) {}
 
-  /// Clears the cache; from now on it collects the facets that a tool within `reach` of `centre` can touch.
-  void restart(const Vec3& centre, double reach) noexcept;
+  /// Clears the cache; from now on it collects the facets that a tool within `reach` of the segment from
+  /// `from` to from + way can touch.
+  void restart(const Vec3& from, const Vec3& way, double reach) noexcept;
   /// Point tool: adds a facet. A `deforming` one is kept at any distance.
   void add(const Facet& facet, bool deforming) noexcept;
-  /// Ball tool: adds a triangle by a ball around it; the centre is that of its disc.
+  /// Ball tool: adds a triangle by a ball around it.
   void add(const TriangleId& id, const Vec3& centre, double radius, double skin) noexcept;
+  /// The same by a disc whose centre may be off by `rounding`.
+  void add(const TriangleId& id, const Disc& disc, double skin, double rounding) noexcept;
   /// Marks the cache as incomplete.
   void invalidate() noexcept { complete_ = false; }
 
   /// Whether the cache holds every facet that a tool within `radius` of p can touch.
   bool covers(const Vec3& p, double radius) const noexcept {
-    return complete_ && (p - centre_).norm() + radius <= reach_;
+    return complete_ && (p - nearestOfWay(p)).norm() + radius <= reach_;
+  }
+  /// The same for all places between p and q.
+  bool covers(const Vec3& p, const Vec3& q) const noexcept { return covers(p, 0) && covers(q, 0); }
+  /// Whether p is not near the rim.
+  bool isInside(const Vec3& p) const noexcept {
+    return complete_ && (p - nearestOfWay(p)).squaredNorm() < 0.64 * reach_ * reach_;
+  }
+  /// Parameter, at most 1, up to which p + t d is covered. p is.
+  double exitOf(const Vec3& p, const Vec3& d) const noexcept;
+  /// Of the segment that it was restarted around.
+  Vec3 nearestOfWay(const Vec3& p) const noexcept {
+    const double length2 = way_.squaredNorm();
+    if (length2 == 0) return from_;
+    return from_ + std::clamp((p - from_).dot(way_) / length2, 0.0, 1.0) * way_;
   }
   bool complete() const noexcept { return complete_; }
-  const Vec3& centre() const noexcept { return centre_; }
   double reach() const noexcept { return reach_; }
+  /// Of a ball around all that is covered.
+  double extent() const noexcept { return reach_ + 0.5 * way_.norm(); }
   int size() const noexcept { return count_; }
   double maxSkin() const noexcept { return maxSkin_; }
 
@@ -60,10 +83,11 @@ class FacetCache {
   void moveTo(const Vec3& p) noexcept;
   const TriangleId& triangle(int i) const noexcept { return triangles_[static_cast<std::size_t>(i)]; }
   /// Ball tool: all triangles that may be within `distance` of the segment from the present position by d.
-  /// Valid until the next call. normalOf(id) is the normal of the disc around a triangle.
-  template <class NormalOf>
-  std::span<const std::uint16_t> trianglesNear(const Vec3& d, double distance,
-                                               const NormalOf& normalOf) noexcept;
+  /// Valid until the next call. discOf(id) is the disc around a triangle.
+  template <class DiscOf>
+  std::span<const std::uint16_t> trianglesNear(const Vec3& d, double distance, const DiscOf& discOf) noexcept;
+  /// How many tests of one disc against a path the searches since the last call took the time of.
+  int takeScans() noexcept { return std::exchange(scans_, 0); }
   /// Lower bound of the distance while the tool moves by d; refine() makes it exact for the present position.
   double lowerBound(int i, const Vec3& d) const noexcept;
   /// Replaces the bound by the exact distance: `foot` is the nearest point. Returns the new lowerBound().
@@ -89,12 +113,14 @@ class FacetCache {
   };
   Reach reachOf(const Vec3& p, const Vec3& d, double distance) const noexcept;
   void missBalls(const Reach& reach) noexcept;
+  void missDiscs(const Reach& reach) noexcept;
   bool reaches(const Reach& reach, std::size_t i) const noexcept;
-  template <class NormalOf>
-  int findNear(const Reach& reach, const NormalOf& normalOf, std::uint16_t* found) noexcept;
+  void set(std::size_t i, const Disc& disc) noexcept;
+  template <class DiscOf>
+  int findNear(const Reach& reach, const DiscOf& discOf, std::uint16_t* found) noexcept;
   NearPlane planeBefore(std::size_t i, const Vec3f& p) const noexcept;
-  template <class NormalOf>
-  void knowNear(double distance, const NormalOf& normalOf) noexcept;
+  template <class DiscOf>
+  void knowNear(double distance, const DiscOf& discOf) noexcept;
   void makeNearPlanes() noexcept;
   std::span<const std::uint16_t> nearPlanesMet(const Vec3& d, double distance) noexcept;
 
@@ -115,12 +141,16 @@ class FacetCache {
   };
 
   double toolRadius_;
-  Vec3 centre_ = Vec3::Zero();
+  Vec3 from_ = Vec3::Zero();
+  Vec3 way_ = Vec3::Zero();
+  Vec3 centre_ = Vec3::Zero();  // the middle of the way
   double reach_ = 0;
   bool complete_ = false;
   int count_ = 0;
   double maxSkin_ = 0;    // over all entries
   double maxRadius_ = 0;  // of the ball that touches them
+  double rounding_ = 0;   // of the discs
+  bool knowsAll_ = true;  // the normals of all discs
   std::array<SupportPlane, kMaxTriangles> supportPlanes_;
   std::array<Facet, kMaxFacets> facets_;
   Filter filter_;
@@ -130,37 +160,46 @@ class FacetCache {
   std::array<double, kMaxFacets> distances_;  // lower bounds, plus the travel at that time
   std::array<TriangleId, kMaxTriangles> triangles_;
   // The balls around them, relative to centre_, in single precision, for it is a first filter. One array for
-  // each number, so that the compiler computes several at once. Of a disc with the same centre and radius,
-  // the normal; its x is not a number while it is not known.
+  // each number, so that the compiler computes several at once. Once the normal is known, those of the disc;
+  // before, its x is not a number.
   using TriangleColumn = std::array<float, kMaxTriangles>;
   std::array<TriangleColumn, 3> discCentres_;
   TriangleColumn discRadii_;
-  std::array<Vec3f, kMaxTriangles> discNormals_;
+  std::array<TriangleColumn, 3> discNormals_;
   TriangleColumn misses_;
-  std::array<std::uint16_t, kMaxTriangles> found_;
+  std::array<std::uint16_t, kMaxTriangles + 1> found_;  // one more: see findNear()
   // Those around a place where the tool is or was, with their planes from there: a cast that stays near looks
   // at no others. One array for each number.
-  std::array<std::uint16_t, kMaxTriangles> near_;
+  std::array<std::uint16_t, kMaxTriangles + 1> near_;
   std::array<TriangleColumn, 3> nearNormals_;
   TriangleColumn nearBounds_;
   int nearCount_ = 0;
   Vec3 nearCentre_ = Vec3::Zero();
   double nearDistance_ = -1;  // up to which all are there
   int nearUses_ = 0;          // since then
+  int scans_ = 0;
   // Of the tool radius: how much farther than asked they are sought. Little where the tool soon leaves them.
   static constexpr double kLeastNearShare = 0.003;
   static constexpr double kMostNearShare = 0.05;
   double nearShare_ = kMostNearShare;
 };
 
-template <class NormalOf>
-int FacetCache::findNear(const Reach& reach, const NormalOf& normalOf, std::uint16_t* found) noexcept {
-  missBalls(reach);
+template <class DiscOf>
+int FacetCache::findNear(const Reach& reach, const DiscOf& discOf, std::uint16_t* found) noexcept {
   int n = 0;
+  scans_ += count_;
+  if (knowsAll_) {
+    missDiscs(reach);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+      found[n] = static_cast<std::uint16_t>(i);
+      n += misses_[i] > 0 ? 0 : 1;
+    }
+    return n;
+  }
+  missBalls(reach);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
     if (misses_[i] > 0) continue;
-    Vec3f& normal = discNormals_[i];
-    if (std::isnan(normal.x())) normal = normalOf(triangles_[i]).template cast<float>();
+    if (std::isnan(discNormals_[0][i])) set(i, discOf(triangles_[i]));
     if (reaches(reach, i)) found[n++] = static_cast<std::uint16_t>(i);
   }
   return n;
@@ -168,8 +207,8 @@ int FacetCache::findNear(const Reach& reach, const NormalOf& normalOf, std::uint
 
 // Those within `distance` and a little more. Not far from where the planes were made they tell nearly the
 // distance.
-template <class NormalOf>
-void FacetCache::knowNear(double distance, const NormalOf& normalOf) noexcept {
+template <class DiscOf>
+void FacetCache::knowNear(double distance, const DiscOf& discOf) noexcept {
   constexpr int kFewUses = 4;
   const double from_m = (toolPosition_ - nearCentre_).norm();
   const bool known = from_m + distance <= nearDistance_;
@@ -182,23 +221,23 @@ void FacetCache::knowNear(double distance, const NormalOf& normalOf) noexcept {
     if (nearUses_ > 2 * kFewUses) nearShare_ = std::min(2 * nearShare_, kMostNearShare);
     nearUses_ = 0;
     nearDistance_ = distance + nearShare_ * toolRadius_;
-    nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), normalOf, near_.data());
+    nearCount_ = findNear(reachOf(nearCentre_, Vec3::Zero(), nearDistance_), discOf, near_.data());
     // In a hollow of about the tool's radius: farther away there are no others.
     if (nearCount_ == count_) nearDistance_ = std::numeric_limits<double>::infinity();
   }
   makeNearPlanes();
 }
 
-template <class NormalOf>
+template <class DiscOf>
 std::span<const std::uint16_t> FacetCache::trianglesNear(const Vec3& d, double distance,
-                                                         const NormalOf& normalOf) noexcept {
+                                                         const DiscOf& discOf) noexcept {
   const double length = d.norm();
-  if (length <= kMostNearShare * toolRadius_) knowNear(distance + length, normalOf);
+  if (length <= kMostNearShare * toolRadius_) knowNear(distance + length, discOf);
   if ((toolPosition_ - nearCentre_).norm() + length + distance <= nearDistance_) {
     ++nearUses_;
     return nearPlanesMet(d, distance);
   }
-  const int n = findNear(reachOf(toolPosition_, d, distance), normalOf, found_.data());
+  const int n = findNear(reachOf(toolPosition_, d, distance), discOf, found_.data());
   return {found_.data(), static_cast<std::size_t>(n)};
 }
 

@@ -66,7 +66,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   wasHeld_ = contactSet_.count > 0;
   if (contactSet_.count > 0) {
     const double carried = (position_ - from).norm();
-    query_.gatherAhead(position_, hip - hipBefore_, 1.5 * carried + kGatherMargin_m);
+    query_.gatherAhead(position_, expectedWay(hip), 1.5 * carried + kGatherMargin_m);
   }
   updateProxy(hip);
   popThrough(hip, status);
@@ -89,6 +89,17 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   positionBefore_ = position_;
   hipBefore_ = hip;
   return contactSet_;
+}
+
+// The way of the HIP; along a way, without what leads into the faces that hold a ball.
+Vec3 Proxy::expectedWay(const Vec3& hip) const noexcept {
+  Vec3 way = hip - hipBefore_;
+  if (query_.gathersBalls()) return way;
+  for (int i = 0; i < contactSet_.count; ++i) {
+    const Vec3& normal = contactSet_.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
+    way -= std::min(0.0, normal.dot(way)) * normal;
+  }
+  return way;
 }
 
 void Proxy::reset() noexcept {

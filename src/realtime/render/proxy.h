@@ -158,6 +158,7 @@ class Proxy {
 
   void startAt(const SceneAtTime& now, const Vec3& hip) noexcept;
   void beFree() noexcept;
+  Vec3 expectedWay(const Vec3& hip) const noexcept;
   void carry(const Vec3& hip, std::uint32_t& status) noexcept;
   void chooseCarrier() noexcept;
   bool turnsAway(const PlacedObject& object) const noexcept;

@@ -279,7 +279,7 @@ bool Proxy::searchDescent(const Vec3& target, const ActiveSet& active) noexcept 
     // What was gathered before may cover that with the proxy at its rim.
     if (!query_.isGathered(position_)) query_.gather(position_, reach);
   }
-  if (!query_.isGathered(position_)) return false;
+  if (!query_.isGathered(position_) || query_.workSpent()) return false;
   DescentDirections descent;
   collectTouchedFaces(descent);
   findDescentDirections(pull, active, descent);

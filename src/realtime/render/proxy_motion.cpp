@@ -538,7 +538,7 @@ bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32
   double height = 0;
   query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {
     const PlacedObject& object = query_.object(f.object);
-    if (!object.sweptByDeforming()) return;
+    if (!object.sweptByDeforming() || query_.workSpent()) return;
     const Vec3 start = carriedBy(object, f.triangle, from);
     ObjectHit hit;
     if (!query_.castAtFacet(f, start, position_, hit)) return;

@@ -42,6 +42,7 @@ scene::SceneConfig sceneConfig(const DeviceConfig& config, const device::DeviceP
   scene.ownDamping_Ns_per_m = profile.ownDamping_Ns_per_m;
   scene.servoPeriod_s = 1 / config.servoRate_Hz;
   scene.transportDelay_s = profile.transportDelay_s;
+  scene.ballTool = config.toolRadius_m > 0;
   return scene;
 }
 

@@ -56,6 +56,7 @@ inline std::shared_ptr<scene::MeshGeometry> geometryOf(const TriangleMesh& mesh,
   if (g->target) return g;
   auto fans = std::make_shared<const geometry::Fans>(*g->vertices, triangles, std::vector<bool>());
   if (!fans->empty()) g->fans = std::move(fans);
+  g->discs = std::make_shared<const geometry::DiscTree>(*g->vertices, triangles, std::vector<bool>());
   return g;
 }
 

@@ -1,0 +1,227 @@
+#include "geometry/disc_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace hapticd::geometry {
+namespace {
+
+constexpr float kRounding = 2e-6F;  // relative: more than the operations of a test add up to
+// Of height to length: the corners are exact here, so that the normal of a needle is, too. Many needles are
+// as long as the mesh; balls around them would rule out none.
+constexpr double kThinness = 1e-6;
+
+// 21 bits of each coordinate, alternating: what is near on this curve is near in space.
+std::uint64_t spread(std::uint64_t bits) {
+  bits &= 0x1FFFFF;
+  bits = (bits | bits << 32U) & 0x1F00000000FFFF;
+  bits = (bits | bits << 16U) & 0x1F0000FF0000FF;
+  bits = (bits | bits << 8U) & 0x100F00F00F00F00F;
+  bits = (bits | bits << 4U) & 0x10C30C30C30C30C3;
+  return (bits | bits << 2U) & 0x1249249249249249;
+}
+
+struct Placed {
+  std::uint64_t key;
+  std::uint32_t triangle;
+};
+
+unsigned maskOf(const std::array<float, 8>& misses) {
+  unsigned mask = 0;
+  // What is not a number may be near.
+  for (unsigned i = 0; i < misses.size(); ++i) mask |= (misses[i] > 0 ? 0U : 1U) << i;
+  return mask;
+}
+
+unsigned validOf(std::size_t count, std::size_t group) {
+  const std::size_t left = count - 8 * group;
+  return left >= 8 ? 0xFFU : (1U << left) - 1;
+}
+
+}  // namespace
+
+struct DiscTree::Query {
+  Vec3f from, way;
+  float length2, perLength2;
+  float distance, distance2;
+  std::span<std::uint32_t> found;
+  std::size_t count;
+  int groups;
+};
+
+DiscTree::DiscTree(std::span<const Vec3f> vertices, std::span<const Triangle> triangles,
+                   const std::vector<bool>& leftOut) {
+  const auto isUsable = [&](std::size_t i) {
+    if (!leftOut.empty() && leftOut[i]) return false;
+    return std::all_of(triangles[i].begin(), triangles[i].end(),
+                       [&](std::uint32_t v) { return v < vertices.size() && vertices[v].allFinite(); });
+  };
+  const auto middleOf = [&](const Triangle& t) {
+    return Vec3(
+        (vertices[t[0]].cast<double>() + vertices[t[1]].cast<double>() + vertices[t[2]].cast<double>()) / 3);
+  };
+  Box bounds;
+  std::vector<Placed> order;
+  order.reserve(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (!isUsable(i)) continue;
+    bounds.extend(middleOf(triangles[i]));
+    order.push_back({0, static_cast<std::uint32_t>(i)});
+  }
+  if (order.empty()) return;
+  const double size = std::max(bounds.extents().maxCoeff(), std::numeric_limits<double>::min());
+  for (Placed& placed : order) {
+    const Vec3 at = (middleOf(triangles[placed.triangle]) - bounds.min) * (0x1FFFFF / size);
+    placed.key = spread(static_cast<std::uint64_t>(at.x())) |
+                 spread(static_cast<std::uint64_t>(at.y())) << 1U |
+                 spread(static_cast<std::uint64_t>(at.z())) << 2U;
+  }
+  std::sort(order.begin(), order.end(), [](const Placed& a, const Placed& b) {
+    return a.key != b.key ? a.key < b.key : a.triangle < b.triangle;
+  });
+
+  const auto groupsFor = [](std::size_t count) { return (count + kGroup - 1) / kGroup; };
+  struct FloatBox {
+    Vec3f lower = Vec3f::Constant(std::numeric_limits<float>::infinity());
+    Vec3f upper = Vec3f::Constant(-std::numeric_limits<float>::infinity());
+  };
+  triangles_.resize(order.size());
+  discs_.resize(groupsFor(order.size()));
+  std::vector<FloatBox> boxes(discs_.size());
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    triangles_[place] = order[place].triangle;
+    const Triangle& t = triangles[order[place].triangle];
+    const Vec3 middle = middleOf(t);
+    const Vec3f centre = middle.cast<float>();
+    const Vec3 a = vertices[t[0]].cast<double>() - middle;
+    const Vec3 b = vertices[t[1]].cast<double>() - middle;
+    const Vec3 c = vertices[t[2]].cast<double>() - middle;
+    const double radius2 = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
+    const Vec3 square = (b - a).cross(c - a);
+    const double square2 = square.squaredNorm();
+    Vec3f normal = Vec3f::Zero();
+    if (square2 > kThinness * kThinness * radius2 * radius2)
+      normal = (square / std::sqrt(square2)).cast<float>();
+    FloatBox& box = boxes[place / kGroup];
+    for (const std::uint32_t v : t) {
+      box.lower = box.lower.cwiseMin(vertices[v]);
+      box.upper = box.upper.cwiseMax(vertices[v]);
+    }
+    DiscGroup& group = discs_[place / kGroup];
+    const std::size_t i = place % kGroup;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      group.centre[axis][i] = centre[static_cast<int>(axis)];
+      group.normal[axis][i] = normal[static_cast<int>(axis)];
+    }
+    group.radius[i] =
+        (1 + kRounding) * static_cast<float>(std::sqrt(radius2)) + kRounding * centre.cwiseAbs().maxCoeff();
+    rounding_ = std::max(rounding_, static_cast<double>(kRounding * centre.cwiseAbs().maxCoeff()));
+  }
+  while (true) {
+    Level level{std::vector<BoxGroup>(groupsFor(boxes.size())), boxes.size()};
+    std::vector<FloatBox> above(level.groups.size());
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        level.groups[k / kGroup].lower[axis][k % kGroup] = boxes[k].lower[static_cast<int>(axis)];
+        level.groups[k / kGroup].upper[axis][k % kGroup] = boxes[k].upper[static_cast<int>(axis)];
+      }
+      above[k / kGroup].lower = above[k / kGroup].lower.cwiseMin(boxes[k].lower);
+      above[k / kGroup].upper = above[k / kGroup].upper.cwiseMax(boxes[k].upper);
+    }
+    levels_.push_back(std::move(level));
+    if (above.size() == 1) break;
+    boxes = std::move(above);
+  }
+}
+
+// Of the segment, the part above the disc and the part beside it. See FacetCache::reaches().
+unsigned DiscTree::near(const Query& query, const DiscGroup& group) noexcept {
+  const auto& [cx, cy, cz] = group.centre;
+  const auto& [nx, ny, nz] = group.normal;
+  Column misses;
+  for (std::size_t i = 0; i < kGroup; ++i) {
+    const float x = query.from.x() - cx[i];
+    const float y = query.from.y() - cy[i];
+    const float z = query.from.z() - cz[i];
+    const float up = nx[i] * x + ny[i] * y + nz[i] * z;
+    const float rise = nx[i] * query.way.x() + ny[i] * query.way.y() + nz[i] * query.way.z();
+    const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0.0F;
+    const float offset2 = x * x + y * y + z * z;
+    const float inPlane = x * query.way.x() + y * query.way.y() + z * query.way.z() - up * rise;
+    const float wayInPlane2 = query.length2 - rise * rise;
+    const float along = wayInPlane2 > 0 ? -inPlane / wayInPlane2 : 0.0F;
+    const float share = std::min(std::max(along, 0.0F), 1.0F);
+    const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
+    const float rounding = kRounding * (offset2 + query.length2 + query.distance2);
+    const float room2 = query.distance2 + rounding - lowest * lowest;
+    const float farthest = group.radius[i] + std::sqrt(std::max(0.0F, room2));
+    const float beyond = aside2 - farthest * farthest - rounding;
+    misses[i] = room2 < 0 ? 1.0F : beyond;
+  }
+  return maskOf(misses);
+}
+
+// The box is behind the plane that touches it where it is nearest to the point of the segment that is nearest
+// to its middle. How far the ends of the segment are before that plane is a lower bound.
+unsigned DiscTree::near(const Query& query, const BoxGroup& group) noexcept {
+  const auto& [lx, ly, lz] = group.lower;
+  const auto& [ux, uy, uz] = group.upper;
+  Column misses;
+  for (std::size_t i = 0; i < kGroup; ++i) {
+    const float along = ((0.5F * (lx[i] + ux[i]) - query.from.x()) * query.way.x() +
+                         (0.5F * (ly[i] + uy[i]) - query.from.y()) * query.way.y() +
+                         (0.5F * (lz[i] + uz[i]) - query.from.z()) * query.way.z()) *
+                        query.perLength2;
+    const float share = std::min(std::max(along, 0.0F), 1.0F);
+    const float px = query.from.x() + share * query.way.x();
+    const float py = query.from.y() + share * query.way.y();
+    const float pz = query.from.z() + share * query.way.z();
+    const float ax = px - std::min(std::max(px, lx[i]), ux[i]);
+    const float ay = py - std::min(std::max(py, ly[i]), uy[i]);
+    const float az = pz - std::min(std::max(pz, lz[i]), uz[i]);
+    const float away2 = ax * ax + ay * ay + az * az;
+    const float rise = ax * query.way.x() + ay * query.way.y() + az * query.way.z();
+    const float lowest = away2 + std::min(-share * rise, (1 - share) * rise);  // times the distance
+    misses[i] = lowest > 0 ? lowest * lowest - query.distance2 * away2 : 0.0F;
+  }
+  return maskOf(misses);
+}
+
+void DiscTree::descend(Query& query, std::size_t level, std::size_t group) const noexcept {
+  ++query.groups;
+  const Level& boxes = levels_[level];
+  unsigned mask = near(query, boxes.groups[group]) & validOf(boxes.count, group);
+  for (; mask != 0; mask &= mask - 1) {
+    const std::size_t child = kGroup * group + static_cast<std::size_t>(std::countr_zero(mask));
+    if (level > 0) {
+      descend(query, level - 1, child);
+    } else {
+      ++query.groups;
+      unsigned discs = near(query, discs_[child]) & validOf(triangles_.size(), child);
+      for (; discs != 0 && query.count < query.found.size(); discs &= discs - 1) {
+        query.found[query.count++] =
+            static_cast<std::uint32_t>(kGroup * child + static_cast<std::size_t>(std::countr_zero(discs)));
+      }
+      if (discs != 0) query.count = query.found.size() + 1;
+    }
+    if (query.count > query.found.size()) return;
+  }
+}
+
+std::size_t DiscTree::findNear(const Vec3& from, const Vec3& way, double distance,
+                               std::span<std::uint32_t> found, int& groups) const noexcept {
+  if (levels_.empty()) return 0;
+  Query query{from.cast<float>(), way.cast<float>(), 0, 0, 0, 0, found, 0, 0};
+  query.length2 = query.way.squaredNorm();
+  query.perLength2 = query.length2 > 0 ? 1 / query.length2 : 0;
+  query.distance = (1 + kRounding) * static_cast<float>(distance + rounding_) +
+                   kRounding * (query.from.cwiseAbs() + query.way.cwiseAbs()).maxCoeff();
+  query.distance2 = query.distance * query.distance;
+  descend(query, levels_.size() - 1, 0);
+  groups += query.groups;
+  return query.count;
+}
+
+}  // namespace hapticd::geometry

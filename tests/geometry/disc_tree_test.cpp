@@ -1,0 +1,122 @@
+#include "geometry/disc_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+namespace hapticd::geometry {
+namespace {
+
+// Random triangles of all sizes and shapes, needles among them, `scale` wide and away from the origin.
+TriangleMesh soup(std::mt19937& random, int count, double scale, double away) {
+  std::uniform_real_distribution<double> place(-1, 1);
+  std::lognormal_distribution<double> size(-4, 1.5);
+  const auto direction = [&] { return Vec3(place(random), place(random), place(random)); };
+  TriangleMesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 middle = Vec3::Constant(away) + direction();
+    const Vec3 along = size(random) * direction();
+    const Vec3 aside = (i % 4 == 0 ? 1e-4 : 1) * size(random) * direction();
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Vec3& corner : {Vec3(middle - along), Vec3(middle + along), Vec3(middle + aside)})
+      mesh.vertices.push_back((scale * corner).cast<float>());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+// The least distance between points of a triangle and of a segment: no less than that between the two.
+double sampled(const TriangleMesh& mesh, const Triangle& t, const Vec3& from, const Vec3& way) {
+  constexpr int kSteps = 12;
+  const std::array<Vec3, 3> c{mesh.vertices[t[0]].cast<double>(), mesh.vertices[t[1]].cast<double>(),
+                              mesh.vertices[t[2]].cast<double>()};
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int k = 0; i + k <= kSteps; ++k) {
+      const Vec3 x = c[0] + (c[1] - c[0]) * i / kSteps + (c[2] - c[0]) * k / kSteps;
+      const double length2 = way.squaredNorm();
+      const double share = length2 > 0 ? std::clamp((x - from).dot(way) / length2, 0.0, 1.0) : 0;
+      least = std::min(least, (from + share * way - x).norm());
+    }
+  }
+  return least;
+}
+
+TEST(DiscTree, finds_all_that_is_near_a_way) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-1.5, 1.5);
+  std::vector<std::uint32_t> places(4000);
+  for (const double scale : {1e-3, 1.0, 1e6}) {
+    for (const double away : {0.0, 100.0}) {
+      const TriangleMesh mesh = soup(random, 2000, scale, away);
+      const DiscTree tree(mesh.vertices, mesh.triangles, {});
+      for (int query = 0; query < 40; ++query) {
+        const auto any = [&] { return Vec3(place(random), place(random), place(random)); };
+        const Vec3 from = scale * (Vec3::Constant(away) + any());
+        const Vec3 way = query % 3 == 0 ? Vec3(Vec3::Zero()) : Vec3(scale * 0.3 * any());
+        const double distance = scale * std::pow(10.0, place(random) - 1);
+        int groups = 0;
+        const std::size_t count = tree.findNear(from, way, distance, places, groups);
+        ASSERT_LE(count, places.size());
+        std::set<std::uint32_t> found;
+        for (std::size_t i = 0; i < count; ++i) found.insert(tree.triangleAt(places[i]));
+        EXPECT_EQ(found.size(), count) << "each once";
+        for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+          if (sampled(mesh, mesh.triangles[i], from, way) > distance) continue;
+          ASSERT_TRUE(found.contains(i)) << "triangle " << i << ", query " << query << ", scale " << scale;
+        }
+      }
+    }
+  }
+}
+
+// A ball that lies on a fine plane is near few of its triangles, also those of a way along it.
+TEST(DiscTree, finds_little_more_along_a_plane) {
+  TriangleMesh mesh;
+  constexpr int kCells = 200;
+  for (int j = 0; j <= kCells; ++j) {
+    for (int i = 0; i <= kCells; ++i)
+      mesh.vertices.emplace_back(static_cast<float>(0.1 * i), static_cast<float>(0.1 * j), 0.0F);
+  }
+  for (std::uint32_t j = 0; j < kCells; ++j) {
+    for (std::uint32_t i = 0; i < kCells; ++i) {
+      const std::uint32_t a = j * (kCells + 1) + i;
+      mesh.triangles.push_back({a, a + 1, a + kCells + 2});
+      mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
+    }
+  }
+  const DiscTree tree(mesh.vertices, mesh.triangles, {});
+  std::vector<std::uint32_t> places(8192);
+  int groups = 0;
+  // Radius 5, 50 um around a way of 1 mm: 2.9 mm2 of the plane, 580 triangles.
+  EXPECT_LT(tree.findNear({10, 10, 5}, {1, 0, 0}, 5.05, places, groups), 800U);
+  EXPECT_LT(groups, 400);
+}
+
+TEST(DiscTree, leaves_out_what_is_no_triangle_and_tells_what_does_not_fit) {
+  std::mt19937 random(5);
+  TriangleMesh mesh = soup(random, 100, 1, 0);
+  mesh.vertices[3].x() = std::numeric_limits<float>::quiet_NaN();
+  mesh.triangles[2] = {0, 1, 100'000};
+  std::vector<bool> leftOut(100);
+  leftOut[7] = true;
+  const DiscTree tree(mesh.vertices, mesh.triangles, leftOut);
+  int groups = 0;
+  std::vector<std::uint32_t> places(97);
+  ASSERT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, places, groups), 97U);
+  for (const std::uint32_t place : places) {
+    const std::uint32_t triangle = tree.triangleAt(place);
+    EXPECT_TRUE(triangle != 1 && triangle != 2 && triangle != 7) << triangle;
+  }
+  places.resize(96);
+  EXPECT_GT(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, places, groups), places.size());
+  EXPECT_EQ(DiscTree(mesh.vertices, {}, {}).findNear(Vec3::Zero(), Vec3::Zero(), 1, places, groups), 0U);
+}
+
+}  // namespace
+}  // namespace hapticd::geometry
