@@ -233,7 +233,8 @@ void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noex
     return;
   }
   slide_.share = std::max(kShortest, 0.25 * slide_.share);
-  if (!spares()) return;
+  // The way back takes no move: two tries may leave too little for a third one, and enough for this.
+  if (casts_ >= kMaxCasts / 2 || query_.visits() >= kMaxVisits / 2) return;
   position_ = start;
   findConstraints(hip, active);
 }

@@ -509,6 +509,26 @@ TEST_F(UnequalDomeTest, hand_at_rest_feels_no_steps_with_little_friction) {
   }
 }
 
+// Two tries of a slide fill the spring here, and spend more casts than a third would have. It does not stay
+// there.
+TEST_F(UnequalDomeTest, hand_at_rest_feels_no_steps_where_two_slides_fill_the_spring) {
+  for (const Place& place :
+       {Place{156, 1456, 0.002, {0.0053605, 0.0030211, 0.024}, {0.0053605, 0.0030211, 0.0179512}},
+        Place{332, 1441, 0.002, {0.0042875, 0.0001472, 0.024}, {0.0042875, 0.0001472, 0.0175383}},
+        Place{68, 673, 0.002, {0.0035366, -0.0039272, 0.024}, {0.0035366, -0.0039272, 0.0176645}}}) {
+    for (const double mu : {0.02, 0.05, 0.1}) {
+      build(place, mu);
+      Hand hand(scene.snapshot(), RenderOptions{.toolRadius_m = place.radius});
+      hand.at(place.above);
+      hand.to(place.rest, 0.05);
+      for (int k = 0; k < 50; ++k) hand.at(place.rest);
+      const Vec3 force = hand.now().force_N;
+      for (int k = 0; k < 50; ++k)
+        ASSERT_LT((hand.at(place.rest).force_N - force).norm(), 1e-3) << place.soft << " friction " << mu;
+    }
+  }
+}
+
 TEST_F(UnequalDomeTest, friction_of_what_is_near_and_not_touched_holds_nothing) {
   for (int i = 0; i < reduced(40, 8); ++i) {
     const Place place = anyPlace();
