@@ -594,10 +594,55 @@ class Referee {
     return open;
   }
 
+  // A point is a ball of the gap's radius. Where two faces meet without a shared edge, it sinks between them
+  // or rests on the step from one to the other: it rolls around the edge of a face until it meets another
+  // one. Up to there the surface turns from the normal of the face to the outward direction. The renderer
+  // keeps the ball off a face by 1e-9 of the largest coordinate of its object: steps of this height count, 1
+  // nm is 1.1 degrees.
+  void addSeams(const Face& f, const std::vector<int>& near, std::vector<Point>& normals) const {
+    constexpr double kRadius_m = 0.5 * kGap_m;
+    constexpr double kSkin = 1e-9;
+    constexpr int kTurns = 180;
+    if (f.unbounded || trial_.toolRadius_m > 0) return;
+    double farthest = 0;
+    for (const Face& g : reference_.faces()) {
+      if (!g.unbounded)
+        farthest = std::max(
+            {farthest, g.a.cwiseAbs().maxCoeff(), g.b.cwiseAbs().maxCoeff(), g.c.cwiseAbs().maxCoeff()});
+    }
+    const double least = kRadius_m - kSkin * farthest;
+    const Point& p = rendering_.proxy_m;
+    const Point n = normalAt(f);
+    const std::array<Point, 3> corners{f.a, f.b, f.c};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point side = corners[(k + 1) % 3] - corners[k];
+      const Point foot =
+          corners[k] + std::clamp(side.dot(p - corners[k]) / side.squaredNorm(), 0.0, 1.0) * side;
+      if ((p - foot).norm() > kGap_m) continue;
+      const Point outward = side.cross(f.normal).stableNormalized();
+      const auto turned = [&](int step) {
+        const double angle = 0.5 * M_PI * step / kTurns;
+        return Point(std::cos(angle) * n + std::sin(angle) * outward);
+      };
+      const auto fits = [&](int step) {
+        const Point centre = foot + kRadius_m * turned(step);
+        return std::none_of(near.begin(), near.end(), [&](int i) {
+          const Face& other = reference_.face(i);
+          return !(other.a == f.a && other.b == f.b && other.c == f.c) && !passedFromBehind(other) &&
+                 (centre - nearestOf(other, centre)).norm() < least;
+        });
+      };
+      int last = 0;
+      while (last < kTurns && fits(last + 1)) ++last;
+      if (last > 0) normals.push_back(turned(last));
+    }
+  }
+
   void judgeDirection(const std::vector<int>& near) {
     if (mixedStiffness()) return;  // blending adds a tangential part
     const Point& force = rendering_.normalForce_N;
     std::vector<Point> normals;
+    std::vector<Point> seams;
     for (const int i : near) {
       const Point n = normalAt(reference_.face(i));
       const auto same = [&](const Point& m) { return (m - n).squaredNorm() < 1e-18; };
@@ -607,6 +652,7 @@ class Referee {
         normals.insert(normals.end(), open.begin(), open.end());
         if (trial_.sides == Sides::both) normals.push_back(-n);
       }
+      addSeams(reference_.face(i), near, seams);
       for (const Point& rim : rimsOf(reference_.face(i), near)) {
         normals.push_back(rim);
         if (trial_.sides == Sides::both) normals.push_back(-n);
@@ -616,6 +662,7 @@ class Referee {
     for (const TrialPlane& plane : trial_.planes) {
       if (isBehind(plane, rendering_.proxy_m)) normals.push_back(plane.normal);
     }
+    normals.insert(normals.end(), seams.begin(), seams.end());
     const double off = distanceFromCone(force, normals);
     if (off > 2e-3 * force.norm() + stiffest_ * kForceTolerance_m) {
       report("direction", "the force ", force.transpose(), " is off the cone of ", normals.size(),

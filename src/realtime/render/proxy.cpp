@@ -218,19 +218,25 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
 
 // Where the stiffness changes, the slope at the new place may be another one, and push the proxy back in the
 // next tick, and so on. A slide must not fill the spring: where it does, it goes a share of its way, that of
-// the last ticks, or not at all. Where a move takes much of the work of a tick, there is one only.
+// the last ticks, or not at all. Where a move takes much of the work of a tick, there is one only. A spring
+// that pulls by more than the slopes before and after is not driven by them: the proxy goes where it pulls.
+// Otherwise a wall that it meets there would not hold the hand, and nothing would bear that part of the
+// spring.
 void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noexcept {
   constexpr double kShortest = 1.0 / 32;
   const auto spares = [this] { return casts_ < kMaxCasts / 4 && query_.visits() < kMaxVisits / 8; };
   const Vec3 start = position_;
   const double stored_J = storedInSpring();
-  const bool even = contactSet_.spring.slope_N.isZero(0);
+  const double slope_N = contactSet_.spring.slope_N.norm();
+  const bool even = slope_N == 0;
   const Vec3 back = hip + contactSet_.lateral_m - target;
+  const double driving_N = contactSet_.spring.stiffness_N_per_m * back.norm();
   const auto goes = [&](double share) {
     position_ = start;
     moveFrictionless(target + (1 - share) * back, active);
     findConstraints(hip, active);
-    return (even && contactSet_.spring.slope_N.isZero(0)) || storedInSpring() <= stored_J;
+    const double newSlope_N = contactSet_.spring.slope_N.norm();
+    return (even && newSlope_N == 0) || storedInSpring() <= stored_J || driving_N > slope_N + newSlope_N;
   };
   if (goes(1) || !spares()) return;
   if (goes(slide_.share)) {
@@ -238,7 +244,8 @@ void Proxy::slideTo(const Vec3& target, const Vec3& hip, ActiveSet& active) noex
     return;
   }
   slide_.share = std::max(kShortest, 0.25 * slide_.share);
-  if (!spares()) return;
+  // The way back takes no move: two tries may leave too little for a third one, and enough for this.
+  if (casts_ >= kMaxCasts / 2 || query_.visits() >= kMaxVisits / 2) return;
   position_ = start;
   findConstraints(hip, active);
 }

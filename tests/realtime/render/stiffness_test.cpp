@@ -436,6 +436,33 @@ TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
   }
 }
 
+// Where a slide meets the second wall of a groove, the direction of the spring turns, and with it what the
+// walls hide of a third surface: the spring stores more. The wall holds the hand all the same.
+TEST_F(StiffnessTest, slide_with_friction_is_held_by_the_wall_that_it_meets) {
+  constexpr double kHalf = 0.5;  // of the angle between the walls
+  constexpr int ticks = 60;
+  const Vec3 left(std::cos(kHalf), 0, std::sin(kHalf));
+  const Vec3 right(-std::cos(kHalf), 0, std::sin(kHalf));
+  const Vec3 up(-std::sin(kHalf), 0, std::cos(kHalf));
+  for (const double hard : {400.0, 1140.0, 2000.0}) {
+    scene = SceneFixture();
+    addPlate(Vec3::Zero(), up, left, 1100, 0.04, 0.6);
+    addPlate(Vec3::Zero(), Vec3(std::sin(kHalf), 0, std::cos(kHalf)), right, hard, 0.04, 0.05);
+    addPlate(-0.0005 * left, up, left, 3400, 0.04, 0.5);
+    Hand hand(scene.snapshot());
+    hand.at(0.004 * up + 0.002 * left);
+    hand.to(0.004 * up - 0.0015 * left);
+    const Vec3 way = -0.01 * up + 0.0015 * left;
+    for (int k = 0; k < ticks; ++k) {
+      const Vec3 force = hand.at(hand.hip() + way / ticks).force_N;
+      const double depth = -right.dot(hand.hip());
+      if (depth > 0.0005) {
+        ASSERT_GE(force.dot(right), 0.5 * hard * depth) << hard << " " << k;
+      }
+    }
+  }
+}
+
 // A dome beside a block of another stiffness: on round meshes the slope of the stiffness changes from face to
 // face. The hand sinks into the dome and rests.
 class UnequalDomeTest : public StiffnessTest {
@@ -478,6 +505,26 @@ TEST_F(UnequalDomeTest, hand_at_rest_feels_no_steps_with_little_friction) {
       for (int k = 0; k < 50; ++k)
         farthest = std::max(farthest, (hand.at(place.rest).force_N - force).norm());
       EXPECT_LT(farthest, 1e-3) << i << " friction " << mu;
+    }
+  }
+}
+
+// Two tries of a slide fill the spring here, and spend more casts than a third would have. It does not stay
+// there.
+TEST_F(UnequalDomeTest, hand_at_rest_feels_no_steps_where_two_slides_fill_the_spring) {
+  for (const Place& place :
+       {Place{156, 1456, 0.002, {0.0053605, 0.0030211, 0.024}, {0.0053605, 0.0030211, 0.0179512}},
+        Place{332, 1441, 0.002, {0.0042875, 0.0001472, 0.024}, {0.0042875, 0.0001472, 0.0175383}},
+        Place{68, 673, 0.002, {0.0035366, -0.0039272, 0.024}, {0.0035366, -0.0039272, 0.0176645}}}) {
+    for (const double mu : {0.02, 0.05, 0.1}) {
+      build(place, mu);
+      Hand hand(scene.snapshot(), RenderOptions{.toolRadius_m = place.radius});
+      hand.at(place.above);
+      hand.to(place.rest, 0.05);
+      for (int k = 0; k < 50; ++k) hand.at(place.rest);
+      const Vec3 force = hand.now().force_N;
+      for (int k = 0; k < 50; ++k)
+        ASSERT_LT((hand.at(place.rest).force_N - force).norm(), 1e-3) << place.soft << " friction " << mu;
     }
   }
 }
