@@ -71,9 +71,10 @@ DiscTree::DiscTree(std::span<const Vec3f> vertices, std::span<const Triangle> tr
     order.push_back({0, static_cast<std::uint32_t>(i)});
   }
   if (order.empty()) return;
-  const double size = std::max(bounds.extents().maxCoeff(), std::numeric_limits<double>::min());
+  const double size = bounds.extents().maxCoeff();
   for (Placed& placed : order) {
-    const Vec3 at = (middleOf(triangles[placed.triangle]) - bounds.min) * (0x1FFFFF / size);
+    if (size == 0) break;  // in one place
+    const Vec3 at = (middleOf(triangles[placed.triangle]) - bounds.min) / size * 0x1FFFFF;
     placed.key = spread(static_cast<std::uint64_t>(at.x())) |
                  spread(static_cast<std::uint64_t>(at.y())) << 1U |
                  spread(static_cast<std::uint64_t>(at.z())) << 2U;

@@ -118,5 +118,22 @@ TEST(DiscTree, leaves_out_what_is_no_triangle_and_tells_what_does_not_fit) {
   EXPECT_EQ(DiscTree(mesh.vertices, {}, {}).findNear(Vec3::Zero(), Vec3::Zero(), 1, places, groups), 0U);
 }
 
+// Of one triangle, of copies of it, of one without an extent, and of the smallest numbers.
+TEST(DiscTree, has_room_for_meshes_without_an_extent) {
+  constexpr float kTiny = std::numeric_limits<float>::denorm_min();
+  for (const float size : {0.0F, kTiny, 1.0F}) {
+    const std::vector<Vec3f> corners = {{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {2 * size, 0, 0}};
+    for (const std::size_t copies : {1U, 20U}) {
+      std::vector<Triangle> triangles(copies, {0, 1, 2});
+      triangles.push_back({0, 3, 2});
+      const DiscTree tree(corners, triangles, {});
+      int groups = 0;
+      std::vector<std::uint32_t> places(100);
+      EXPECT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 1, places, groups), copies + 1);
+      EXPECT_EQ(tree.findNear(Vec3(0, 0, 9), Vec3::Zero(), 1, places, groups), 0U);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::geometry

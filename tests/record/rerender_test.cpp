@@ -210,6 +210,8 @@ TEST_F(Rerender, AllCommandsAreInTheFile) {
 
 // What the servo knows is in the file once its force has its full gain: 520 ms after a late tick.
 bool untilFullGain(ScriptedPeer& peer) {
+  peer.send(wire::Ping{});  // what waits to be read is no time
+  if (!peer.untilNext<wire::Pong>()) return false;
   std::size_t states = 0;
   std::size_t since = peer.count<wire::IsTouching>();
   return peer.until([&] {
