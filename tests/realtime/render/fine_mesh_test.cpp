@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "realtime/render/proxy.h"
+#include "reduced.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
