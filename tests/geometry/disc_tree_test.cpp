@@ -75,6 +75,33 @@ TEST(DiscTree, finds_all_that_is_near_a_way) {
   }
 }
 
+// Above the middle of a triangle its disc is exactly as far as itself: what is left is rounding.
+TEST(DiscTree, finds_what_is_just_as_far) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> height(0.001, 2);
+  std::vector<std::uint32_t> places(4000);
+  for (const double away : {0.0, 100.0}) {
+    const TriangleMesh mesh = soup(random, 2000, 1, away);
+    const DiscTree tree(mesh.vertices, mesh.triangles, {});
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+      const Triangle& t = mesh.triangles[i];
+      const auto corner = [&](int k) {
+        return Vec3(mesh.vertices[t[static_cast<std::size_t>(k)]].cast<double>());
+      };
+      const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+      const double h = height(random);
+      const Vec3 above = (corner(0) + corner(1) + corner(2)) / 3 + h * normal;
+      int groups = 0;
+      const std::size_t count = tree.findNear(above, Vec3::Zero(), h, places, groups);
+      ASSERT_LE(count, places.size());
+      const auto end = places.begin() + static_cast<std::ptrdiff_t>(count);
+      EXPECT_TRUE(
+          std::any_of(places.begin(), end, [&](std::uint32_t at) { return tree.triangleAt(at) == i; }))
+          << "triangle " << i << ", away " << away;
+    }
+  }
+}
+
 // A ball that lies on a fine plane is near few of its triangles, also those of a way along it.
 TEST(DiscTree, finds_little_more_along_a_plane) {
   TriangleMesh mesh;
