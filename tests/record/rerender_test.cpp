@@ -325,7 +325,7 @@ TEST_F(Rerender, RecordingBegunDuringAnUploadShowsTheMeshWhenItWasShown) {
     sendCube(peer);
     second.send(wire::HoldHand{.hold = 1, .position = {5, 40, 5}});
     ASSERT_TRUE(untilFullGain(second));
-    ASSERT_TRUE(pressFromAbove(second));
+    ASSERT_TRUE(pressFromAbove(second) && catchUp(second) && untilTicks(second, 100));
     peer.send(wire::RecordingControl{.record = 0, .name = {}});
     ASSERT_TRUE(peer.untilText("recorded "));
   }
