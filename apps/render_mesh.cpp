@@ -34,6 +34,7 @@ std::shared_ptr<const scene::SceneSnapshot> makeScene(const MeshRenderOptions& o
                                                       geometry::TriangleMesh&& mesh) {
   scene::SceneConfig config;
   config.raw = options.raw;
+  config.ballTool = options.toolRadius_mm > 0;
   scene::SceneBuilder builder(config);
   std::vector<scene::Notice> notices;
   const auto apply = [&](scene::SceneCommand&& command) { builder.apply(1, std::move(command), 0, notices); };

@@ -28,6 +28,41 @@ struct Placed {
   std::uint32_t triangle;
 };
 
+struct CornersOf {
+  std::span<const Vec3f> vertices;
+  bool areUsable(const Triangle& t) const {
+    return std::all_of(t.begin(), t.end(),
+                       [&](std::uint32_t v) { return v < vertices.size() && vertices[v].allFinite(); });
+  }
+  Vec3 at(std::uint32_t v) const { return vertices[v].cast<double>(); }
+  Vec3 middle(const Triangle& t) const { return (at(t[0]) + at(t[1]) + at(t[2])) / 3; }
+};
+
+// The usable triangles along the curve.
+std::vector<Placed> ordered(const CornersOf& corners, std::span<const Triangle> triangles,
+                            const std::vector<bool>& leftOut) {
+  Box bounds;
+  std::vector<Placed> order;
+  order.reserve(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if ((!leftOut.empty() && leftOut[i]) || !corners.areUsable(triangles[i])) continue;
+    bounds.extend(corners.middle(triangles[i]));
+    order.push_back({0, static_cast<std::uint32_t>(i)});
+  }
+  const double size = order.empty() ? 0 : bounds.extents().maxCoeff();
+  if (size == 0) return order;  // in one place
+  for (Placed& placed : order) {
+    const Vec3 at = (corners.middle(triangles[placed.triangle]) - bounds.min) / size * 0x1FFFFF;
+    placed.key = spread(static_cast<std::uint64_t>(at.x())) |
+                 spread(static_cast<std::uint64_t>(at.y())) << 1U |
+                 spread(static_cast<std::uint64_t>(at.z())) << 2U;
+  }
+  std::sort(order.begin(), order.end(), [](const Placed& a, const Placed& b) {
+    return a.key != b.key ? a.key < b.key : a.triangle < b.triangle;
+  });
+  return order;
+}
+
 unsigned maskOf(const std::array<float, 8>& misses) {
   unsigned mask = 0;
   // What is not a number may be near.
@@ -43,83 +78,63 @@ unsigned validOf(std::size_t count, std::size_t group) {
 }  // namespace
 
 struct DiscTree::Query {
-  Vec3f from, way;
-  float length2, perLength2;
-  float distance, distance2;
+  NearPath path;
+  float perLength2;
   std::span<std::uint32_t> found;
   std::size_t count;
   int groups;
 };
 
+struct DiscTree::FloatBox {
+  Vec3f lower = Vec3f::Constant(std::numeric_limits<float>::infinity());
+  Vec3f upper = Vec3f::Constant(-std::numeric_limits<float>::infinity());
+};
+
 DiscTree::DiscTree(std::span<const Vec3f> vertices, std::span<const Triangle> triangles,
                    const std::vector<bool>& leftOut) {
-  const auto isUsable = [&](std::size_t i) {
-    if (!leftOut.empty() && leftOut[i]) return false;
-    return std::all_of(triangles[i].begin(), triangles[i].end(),
-                       [&](std::uint32_t v) { return v < vertices.size() && vertices[v].allFinite(); });
-  };
-  const auto middleOf = [&](const Triangle& t) {
-    return Vec3(
-        (vertices[t[0]].cast<double>() + vertices[t[1]].cast<double>() + vertices[t[2]].cast<double>()) / 3);
-  };
-  Box bounds;
-  std::vector<Placed> order;
-  order.reserve(triangles.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (!isUsable(i)) continue;
-    bounds.extend(middleOf(triangles[i]));
-    order.push_back({0, static_cast<std::uint32_t>(i)});
-  }
+  const std::vector<Placed> order = ordered({vertices}, triangles, leftOut);
   if (order.empty()) return;
-  const double size = bounds.extents().maxCoeff();
-  for (Placed& placed : order) {
-    if (size == 0) break;  // in one place
-    const Vec3 at = (middleOf(triangles[placed.triangle]) - bounds.min) / size * 0x1FFFFF;
-    placed.key = spread(static_cast<std::uint64_t>(at.x())) |
-                 spread(static_cast<std::uint64_t>(at.y())) << 1U |
-                 spread(static_cast<std::uint64_t>(at.z())) << 2U;
-  }
-  std::sort(order.begin(), order.end(), [](const Placed& a, const Placed& b) {
-    return a.key != b.key ? a.key < b.key : a.triangle < b.triangle;
-  });
-
-  const auto groupsFor = [](std::size_t count) { return (count + kGroup - 1) / kGroup; };
-  struct FloatBox {
-    Vec3f lower = Vec3f::Constant(std::numeric_limits<float>::infinity());
-    Vec3f upper = Vec3f::Constant(-std::numeric_limits<float>::infinity());
-  };
   triangles_.resize(order.size());
   discs_.resize(groupsFor(order.size()));
   std::vector<FloatBox> boxes(discs_.size());
   for (std::size_t place = 0; place < order.size(); ++place) {
     triangles_[place] = order[place].triangle;
     const Triangle& t = triangles[order[place].triangle];
-    const Vec3 middle = middleOf(t);
-    const Vec3f centre = middle.cast<float>();
-    const Vec3 a = vertices[t[0]].cast<double>() - middle;
-    const Vec3 b = vertices[t[1]].cast<double>() - middle;
-    const Vec3 c = vertices[t[2]].cast<double>() - middle;
-    const double radius2 = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
-    const Vec3 square = (b - a).cross(c - a);
-    const double square2 = square.squaredNorm();
-    Vec3f normal = Vec3f::Zero();
-    if (square2 > kThinness * kThinness * radius2 * radius2)
-      normal = (square / std::sqrt(square2)).cast<float>();
+    setDisc(place, vertices, t);
     FloatBox& box = boxes[place / kGroup];
     for (const std::uint32_t v : t) {
       box.lower = box.lower.cwiseMin(vertices[v]);
       box.upper = box.upper.cwiseMax(vertices[v]);
     }
-    DiscGroup& group = discs_[place / kGroup];
-    const std::size_t i = place % kGroup;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      group.centre[axis][i] = centre[static_cast<int>(axis)];
-      group.normal[axis][i] = normal[static_cast<int>(axis)];
-    }
-    group.radius[i] =
-        (1 + kRounding) * static_cast<float>(std::sqrt(radius2)) + kRounding * centre.cwiseAbs().maxCoeff();
-    rounding_ = std::max(rounding_, static_cast<double>(kRounding * centre.cwiseAbs().maxCoeff()));
   }
+  buildLevels(std::move(boxes));
+}
+
+void DiscTree::setDisc(std::size_t place, std::span<const Vec3f> vertices, const Triangle& t) {
+  const CornersOf corners{vertices};
+  const Vec3 middle = corners.middle(t);
+  const Vec3f centre = middle.cast<float>();
+  const Vec3 a = corners.at(t[0]) - middle;
+  const Vec3 b = corners.at(t[1]) - middle;
+  const Vec3 c = corners.at(t[2]) - middle;
+  const double radius2 = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
+  const Vec3 square = (b - a).cross(c - a);
+  const double square2 = square.squaredNorm();
+  Vec3f normal = Vec3f::Zero();
+  if (square2 > kThinness * kThinness * radius2 * radius2)
+    normal = (square / std::sqrt(square2)).cast<float>();
+  DiscGroup& group = discs_[place / kGroup];
+  const std::size_t i = place % kGroup;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    group.centre[axis][i] = centre[static_cast<int>(axis)];
+    group.normal[axis][i] = normal[static_cast<int>(axis)];
+  }
+  const float error = kRounding * centre.cwiseAbs().maxCoeff();
+  group.radius[i] = (1 + kRounding) * static_cast<float>(std::sqrt(radius2)) + error;
+  rounding_ = std::max(rounding_, static_cast<double>(error));
+}
+
+void DiscTree::buildLevels(std::vector<FloatBox> boxes) {
   while (true) {
     Level level{std::vector<BoxGroup>(groupsFor(boxes.size())), boxes.size()};
     std::vector<FloatBox> above(level.groups.size());
@@ -132,34 +147,19 @@ DiscTree::DiscTree(std::span<const Vec3f> vertices, std::span<const Triangle> tr
       above[k / kGroup].upper = above[k / kGroup].upper.cwiseMax(boxes[k].upper);
     }
     levels_.push_back(std::move(level));
-    if (above.size() == 1) break;
+    if (above.size() == 1) return;
     boxes = std::move(above);
   }
 }
 
-// Of the segment, the part above the disc and the part beside it. See FacetCache::reaches().
 unsigned DiscTree::near(const Query& query, const DiscGroup& group) noexcept {
   const auto& [cx, cy, cz] = group.centre;
   const auto& [nx, ny, nz] = group.normal;
+  const NearPath& path = query.path;
   Column misses;
   for (std::size_t i = 0; i < kGroup; ++i) {
-    const float x = query.from.x() - cx[i];
-    const float y = query.from.y() - cy[i];
-    const float z = query.from.z() - cz[i];
-    const float up = nx[i] * x + ny[i] * y + nz[i] * z;
-    const float rise = nx[i] * query.way.x() + ny[i] * query.way.y() + nz[i] * query.way.z();
-    const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0.0F;
-    const float offset2 = x * x + y * y + z * z;
-    const float inPlane = x * query.way.x() + y * query.way.y() + z * query.way.z() - up * rise;
-    const float wayInPlane2 = query.length2 - rise * rise;
-    const float along = wayInPlane2 > 0 ? -inPlane / wayInPlane2 : 0.0F;
-    const float share = std::min(std::max(along, 0.0F), 1.0F);
-    const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
-    const float rounding = kRounding * (offset2 + query.length2 + query.distance2);
-    const float room2 = query.distance2 + rounding - lowest * lowest;
-    const float farthest = group.radius[i] + std::sqrt(std::max(0.0F, room2));
-    const float beyond = aside2 - farthest * farthest - rounding;
-    misses[i] = room2 < 0 ? 1.0F : beyond;
+    misses[i] = missOfDisc(path, path.from.x() - cx[i], path.from.y() - cy[i], path.from.z() - cz[i], nx[i],
+                           ny[i], nz[i], group.radius[i], kRounding);
   }
   return maskOf(misses);
 }
@@ -171,21 +171,21 @@ unsigned DiscTree::near(const Query& query, const BoxGroup& group) noexcept {
   const auto& [ux, uy, uz] = group.upper;
   Column misses;
   for (std::size_t i = 0; i < kGroup; ++i) {
-    const float along = ((0.5F * (lx[i] + ux[i]) - query.from.x()) * query.way.x() +
-                         (0.5F * (ly[i] + uy[i]) - query.from.y()) * query.way.y() +
-                         (0.5F * (lz[i] + uz[i]) - query.from.z()) * query.way.z()) *
+    const float along = ((0.5F * (lx[i] + ux[i]) - query.path.from.x()) * query.path.way.x() +
+                         (0.5F * (ly[i] + uy[i]) - query.path.from.y()) * query.path.way.y() +
+                         (0.5F * (lz[i] + uz[i]) - query.path.from.z()) * query.path.way.z()) *
                         query.perLength2;
     const float share = std::min(std::max(along, 0.0F), 1.0F);
-    const float px = query.from.x() + share * query.way.x();
-    const float py = query.from.y() + share * query.way.y();
-    const float pz = query.from.z() + share * query.way.z();
+    const float px = query.path.from.x() + share * query.path.way.x();
+    const float py = query.path.from.y() + share * query.path.way.y();
+    const float pz = query.path.from.z() + share * query.path.way.z();
     const float ax = px - std::min(std::max(px, lx[i]), ux[i]);
     const float ay = py - std::min(std::max(py, ly[i]), uy[i]);
     const float az = pz - std::min(std::max(pz, lz[i]), uz[i]);
     const float away2 = ax * ax + ay * ay + az * az;
-    const float rise = ax * query.way.x() + ay * query.way.y() + az * query.way.z();
+    const float rise = ax * query.path.way.x() + ay * query.path.way.y() + az * query.path.way.z();
     const float lowest = away2 + std::min(-share * rise, (1 - share) * rise);  // times the distance
-    misses[i] = lowest > 0 ? lowest * lowest - query.distance2 * away2 : 0.0F;
+    misses[i] = lowest > 0 ? lowest * lowest - query.path.distance2 * away2 : 0.0F;
   }
   return maskOf(misses);
 }
@@ -214,12 +214,12 @@ void DiscTree::descend(Query& query, std::size_t level, std::size_t group) const
 std::size_t DiscTree::findNear(const Vec3& from, const Vec3& way, double distance,
                                std::span<std::uint32_t> found, int& groups) const noexcept {
   if (levels_.empty()) return 0;
-  Query query{from.cast<float>(), way.cast<float>(), 0, 0, 0, 0, found, 0, 0};
-  query.length2 = query.way.squaredNorm();
-  query.perLength2 = query.length2 > 0 ? 1 / query.length2 : 0;
-  query.distance = (1 + kRounding) * static_cast<float>(distance + rounding_) +
-                   kRounding * (query.from.cwiseAbs() + query.way.cwiseAbs()).maxCoeff();
-  query.distance2 = query.distance * query.distance;
+  Query query{{from.cast<float>(), way.cast<float>(), 0, 0, 0}, 0, found, 0, 0};
+  query.path.length2 = query.path.way.squaredNorm();
+  query.perLength2 = query.path.length2 > 0 ? 1 / query.path.length2 : 0;
+  query.path.distance = (1 + kRounding) * static_cast<float>(distance + rounding_) +
+                        kRounding * (query.path.from.cwiseAbs() + query.path.way.cwiseAbs()).maxCoeff();
+  query.path.distance2 = query.path.distance * query.path.distance;
   descend(query, levels_.size() - 1, 0);
   groups += query.groups;
   return query.count;

@@ -6,7 +6,9 @@
 // several at once.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -15,6 +17,35 @@
 #include "geometry/triangle_mesh.h"
 
 namespace hapticd::geometry {
+
+/// A path, for what lies within a distance of it. In single precision.
+struct NearPath {
+  Vec3f from, way;
+  float length2;  ///< of the way
+  float distance, distance2;
+};
+
+/// Above 0 where no place of the path is within its distance of a disc (square lengths). `x`, `y` and `z`
+/// lead from the centre to the begin of the path; `rounding` is relative. Numbers and no vectors, so that the
+/// compiler computes several discs at once.
+inline float missOfDisc(const NearPath& path, float x, float y, float z, float nx, float ny, float nz,
+                        float radius, float rounding) noexcept {
+  // Of the path, the part above the disc and the part beside it.
+  const float up = nx * x + ny * y + nz * z;
+  const float rise = nx * path.way.x() + ny * path.way.y() + nz * path.way.z();
+  const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0.0F;
+  const float offset2 = x * x + y * y + z * z;
+  const float inPlane = x * path.way.x() + y * path.way.y() + z * path.way.z() - up * rise;
+  const float wayInPlane2 = path.length2 - rise * rise;
+  const float along = wayInPlane2 > 0 ? -inPlane / wayInPlane2 : 0.0F;
+  const float share = std::min(std::max(along, 0.0F), 1.0F);
+  const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
+  const float error2 = rounding * (offset2 + path.length2 + path.distance2);
+  const float room2 = path.distance2 + error2 - lowest * lowest;
+  const float farthest = radius + std::sqrt(std::max(0.0F, room2));
+  const float beyond = aside2 - farthest * farthest - error2;
+  return room2 < 0 ? 1.0F : beyond;
+}
 
 /// Immutable. Queries are noexcept, lock-free and allocation-free. All is in single precision and padded by
 /// more than its rounding: a query finds a superset of what is near.
@@ -65,7 +96,11 @@ class DiscTree {
     std::size_t count = 0;  // of the boxes
   };
   struct Query;
+  struct FloatBox;
 
+  static std::size_t groupsFor(std::size_t count) { return (count + kGroup - 1) / kGroup; }
+  void setDisc(std::size_t place, std::span<const Vec3f> vertices, const Triangle& triangle);
+  void buildLevels(std::vector<FloatBox> boxes);
   static unsigned near(const Query& query, const DiscGroup& group) noexcept;
   static unsigned near(const Query& query, const BoxGroup& group) noexcept;
   void descend(Query& query, std::size_t level, std::size_t group) const noexcept;

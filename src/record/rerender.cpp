@@ -68,11 +68,6 @@ Bytes outcome(const TickReport& report) {
   return bytes;
 }
 
-scene::SceneConfig changed(scene::SceneConfig config, const RerenderChanges& changes) {
-  config.raw = config.raw || changes.raw;
-  return config;
-}
-
 realtime::TickOptions changed(realtime::TickOptions options, const RerenderChanges& changes) {
   options.render.toolRadius_m = changes.toolRadius_m.value_or(options.render.toolRadius_m);
   options.render.forceShading = changes.forceShading.value_or(options.render.forceShading);
@@ -81,6 +76,13 @@ realtime::TickOptions changed(realtime::TickOptions options, const RerenderChang
   options.reports = 1;
   options.blackBox_s = 0;
   return options;
+}
+
+scene::SceneConfig changedScene(const RecordedDevice& recorded, const RerenderChanges& changes) {
+  scene::SceneConfig config = recorded.sceneConfig;
+  config.raw = config.raw || changes.raw;
+  config.ballTool = changed(recorded.tick, changes).render.toolRadius_m > 0;
+  return config;
 }
 
 }  // namespace
@@ -102,8 +104,8 @@ struct Rerenderer::Seat {
   Seat(const RecordedDevice& recorded, const RerenderChanges& changes)
       : scene(recorded.scene),
         control{false, recorded.tick.guard.armed, 0, 0},
-        surfaces(changes, changed(recorded.sceneConfig, changes)),
-        builder(withSeams(changed(recorded.sceneConfig, changes))),
+        surfaces(changes, changedScene(recorded, changes)),
+        builder(withSeams(changedScene(recorded, changes))),
         tick(device, clock, changed(recorded.tick, changes)) {}
 
   scene::SceneConfig withSeams(scene::SceneConfig config) {

@@ -72,6 +72,7 @@ class SurfaceList {
  private:
   static scene::SceneConfig without(scene::SceneConfig config) {
     config.stopwatch = nullptr;
+    config.ballTool = false;  // nothing touches it
     return config;
   }
 

@@ -117,19 +117,8 @@ FacetCache::Reach FacetCache::reachOf(const Vec3& p, const Vec3& d, double dista
 // Whether the path comes near the disc around triangle i. True where a number is not one.
 bool FacetCache::reaches(const Reach& reach, std::size_t i) const noexcept {
   const Vec3f offset = reach.from - Vec3f(discCentres_[0][i], discCentres_[1][i], discCentres_[2][i]);
-  const Vec3f normal(discNormals_[0][i], discNormals_[1][i], discNormals_[2][i]);
-  const float up = normal.dot(offset);
-  const float rise = normal.dot(reach.way);
-  const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0;
-  const float offset2 = offset.squaredNorm();
-  const float inPlane = offset.dot(reach.way) - up * rise;
-  const float wayInPlane2 = reach.length2 - rise * rise;
-  const float share = wayInPlane2 > 0 ? std::clamp(-inPlane / wayInPlane2, 0.0F, 1.0F) : 0.0F;
-  const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
-  const float rounding = kSingleRounding * (offset2 + reach.length2 + reach.distance2);
-  const float room2 = reach.distance2 + rounding - lowest * lowest;
-  const float farthest = discRadii_[i] + std::sqrt(std::max(0.0F, room2));
-  return !(room2 < 0) && !(aside2 - farthest * farthest > rounding);
+  return !(geometry::missOfDisc(reach, offset.x(), offset.y(), offset.z(), discNormals_[0][i],
+                                discNormals_[1][i], discNormals_[2][i], discRadii_[i], kSingleRounding) > 0);
 }
 
 // reaches() for all of them, whose normals are known: above 0 where it is false.
@@ -138,23 +127,9 @@ void FacetCache::missDiscs(const Reach& reach) noexcept {
   const auto& [cx, cy, cz] = discCentres_;
   const auto& [nx, ny, nz] = discNormals_;
   for (std::size_t i = 0; i < count; ++i) {
-    const float x = reach.from.x() - cx[i];
-    const float y = reach.from.y() - cy[i];
-    const float z = reach.from.z() - cz[i];
-    const float up = nx[i] * x + ny[i] * y + nz[i] * z;
-    const float rise = nx[i] * reach.way.x() + ny[i] * reach.way.y() + nz[i] * reach.way.z();
-    const float lowest = up * (up + rise) > 0 ? std::min(std::abs(up), std::abs(up + rise)) : 0.0F;
-    const float offset2 = x * x + y * y + z * z;
-    const float inPlane = x * reach.way.x() + y * reach.way.y() + z * reach.way.z() - up * rise;
-    const float wayInPlane2 = reach.length2 - rise * rise;
-    const float along = wayInPlane2 > 0 ? -inPlane / wayInPlane2 : 0.0F;
-    const float share = std::min(std::max(along, 0.0F), 1.0F);
-    const float aside2 = offset2 - up * up + share * (2 * inPlane + share * wayInPlane2);
-    const float rounding = kSingleRounding * (offset2 + reach.length2 + reach.distance2);
-    const float room2 = reach.distance2 + rounding - lowest * lowest;
-    const float farthest = discRadii_[i] + std::sqrt(std::max(0.0F, room2));
-    const float beyond = aside2 - farthest * farthest - rounding;
-    misses_[i] = room2 < 0 ? 1.0F : beyond;
+    misses_[i] =
+        geometry::missOfDisc(reach, reach.from.x() - cx[i], reach.from.y() - cy[i], reach.from.z() - cz[i],
+                             nx[i], ny[i], nz[i], discRadii_[i], kSingleRounding);
   }
 }
 

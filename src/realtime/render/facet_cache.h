@@ -102,10 +102,7 @@ class FacetCache {
 
  private:
   // A path with what is within some distance of it, relative to centre_.
-  struct Reach {
-    Vec3f from, way;
-    float length2, distance, distance2;
-  };
+  using Reach = geometry::NearPath;
   // Through the point of a disc nearest to some place, and how far that is at least.
   struct NearPlane {
     Vec3f normal;
