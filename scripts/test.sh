@@ -46,12 +46,17 @@ total_skipped=0
 flaky=()
 summary=()
 
-# Arguments for ctest, by preset.
+# A part is a preset, or 'asan-computing': the tests of asan that wait for nothing, which run beside those of tsan.
+preset_of() { echo "${1%-*}"; }
+log_of() { echo "build/$(preset_of "$1")/test${1#"$(preset_of "$1")"}.log"; }
+
+# Arguments for ctest, by part.
 filter_of() {
   case "$1" in
     release) [ "${#programs[@]}" = 0 ] || (IFS='|'; echo "-R ^(${programs[*]})[.]") ;;
-    asan) echo -LE apps ;;
-    tsan) echo -L threads ;;
+    asan) echo "-LE apps|computing" ;;
+    asan-computing) echo "-L computing" ;;
+    tsan) echo "-L threads" ;;
   esac
 }
 
@@ -81,9 +86,10 @@ build() {
     awk 'NR % 10 == 1 || !/^\[[0-9]+\/[0-9]+\] (Building|Linking)/'
 }
 
-# run_ctest PRESET LOG ARGUMENTS...
+# run_ctest PART LOG ARGUMENTS...
 run_ctest() {
-  local preset=$1 log=$2
+  local part=$1 log=$2 preset
+  preset=$(preset_of "$part")
   shift 2
   export TSAN_OPTIONS="suppressions=$PWD/scripts/tsan.supp:external_symbolizer_path=/usr/bin/llvm-symbolizer-19" ASAN_OPTIONS="detect_leaks=1"
   export LSAN_OPTIONS="suppressions=$PWD/scripts/lsan.supp:print_suppressions=0"
@@ -91,7 +97,7 @@ run_ctest() {
   # TSan does not know the threads of TBB, which is not instrumented: one thread builds the index.
   [ "$preset" != tsan ] || export HAPTICD_EMBREE="threads=1,user_threads=1"
   # shellcheck disable=SC2046
-  ctest --test-dir "build/$preset${room:+/tests/$room}" --output-on-failure "$@" $(filter_of "$preset") >"$log" 2>&1
+  ctest --test-dir "build/$preset${room:+/tests/$room}" --output-on-failure "$@" $(filter_of "$part") >"$log" 2>&1
 }
 
 # The lists at the end of a log of ctest: 'NUMBER - NAME (STATUS)'.
@@ -100,10 +106,11 @@ skipped_in() { grep -E '^[[:space:]]+[0-9]+ - .* \((Skipped|Disabled)\)$' "$1" |
 count() { grep -c . <<<"$1" || true; }
 all_in() { sed -nE 's/.*tests? failed out of ([0-9]+).*/\1/p' "$1" | tail -1; }
 
-# judge PRESET STATUS BUILD_S TEST_S: counts what the first run left. A virtual machine can stall for longer than any
+# judge PART STATUS BUILD_S TEST_S: counts what the first run left. A virtual machine can stall for longer than any
 # deadline, so a failed test runs again, alone; if it passes then, it is flaky. Findings of a sanitizer always count.
 judge() {
-  local preset=$1 status=$2 build_s=$3 test_s=$4 log="build/$1/test.log"
+  local part=$1 status=$2 build_s=$3 test_s=$4 log
+  log=$(log_of "$1")
   local failed skipped all again still unstable=0
   failed=$(failed_in "$log")
   skipped=$(skipped_in "$log")
@@ -112,19 +119,19 @@ judge() {
   if [ -n "$failed" ]; then
     sed -n '/The following tests FAILED/q; p' "$log" | grep -vE ' (Passed|\*\*\*Skipped) +[0-9.]+ sec$' | grep -vE '^ *Start +[0-9]+:' || true
     if grep -qE 'ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error:' "$log"; then
-      echo "== $preset: a sanitizer found an error, so no failed test runs again"
+      echo "== $part: a sanitizer found an error, so no failed test runs again"
     else
-      echo "== $preset: these tests failed and run again, one at a time:"
+      echo "== $part: these tests failed and run again, one at a time:"
       echo "$failed"
       again=0
-      run_ctest "$preset" "$log.again" --rerun-failed || again=$?
+      run_ctest "$part" "$log.again" --rerun-failed || again=$?
       cat "$log.again"
       still=$(failed_in "$log.again")
       [ "$again" = 0 ] || [ -n "$still" ] || still="  0 - ctest (Failed)"
       while IFS= read -r line; do
         if [ -z "$line" ] || grep -qF -- "$(sed -E 's/ \([^()]*\)$//' <<<"$line") (" <<<"$still"; then continue; fi
         unstable=$((unstable + 1))
-        flaky+=("$preset: $(sed -E 's/^[[:space:]]*[0-9]+ - (.*) \([^()]*\)$/\1/' <<<"$line")")
+        flaky+=("$part: $(sed -E 's/^[[:space:]]*[0-9]+ - (.*) \([^()]*\)$/\1/' <<<"$line")")
       done <<<"$failed"
     fi
   elif [ "$status" != 0 ]; then
@@ -134,7 +141,7 @@ judge() {
   local n_failed n_skipped n_passed
   n_failed=$(count "$still")
   if [ "$unstable" -gt "$kAllowedFlaky" ]; then
-    echo "== $preset: more than $kAllowedFlaky flaky tests: they count as failed"
+    echo "== $part: more than $kAllowedFlaky flaky tests: they count as failed"
     n_failed=$((n_failed + unstable))
   fi
   n_skipped=$(count "$skipped")
@@ -143,7 +150,7 @@ judge() {
   total_failed=$((total_failed + n_failed))
   total_skipped=$((total_skipped + n_skipped))
   total_passed=$((total_passed + n_passed))
-  summary+=("$preset: ${all:-0} tests: $n_passed passed, $n_failed failed, $unstable flaky, $n_skipped skipped; waited $build_s s for the build, tests $test_s s")
+  summary+=("$part: ${all:-0} tests: $n_passed passed, $n_failed failed, $unstable flaky, $n_skipped skipped; waited $build_s s for the build, tests $test_s s")
   [ -z "$still" ] || summary+=("failed:" "$still")
   [ -z "$skipped" ] || summary+=("skipped:" "$skipped")
 }
@@ -159,8 +166,15 @@ fi
 # build_beside_tests PRESET: takes only the processor time that the tests leave, for many of them watch what happens within
 # milliseconds; a compiler of the same priority beside them makes them fail.
 build_beside_tests() {
-  chrt --idle --pid 0 "$BASHPID" || renice 19 "$BASHPID" >/dev/null
+  give_way
   build "$1"
+}
+give_way() { chrt --idle --pid 0 "$BASHPID" || renice 19 "$BASHPID" >/dev/null; }
+
+# The tests of threads leave half of the processors' time.
+compute_beside_tests() {
+  give_way
+  run_ctest asan-computing "$(log_of asan-computing)" --parallel "$jobs"
 }
 
 # wait_for_build PRESET PROCESS
@@ -173,7 +187,8 @@ wait_for_build() {
 }
 
 builder=""
-trap '[ -z "$builder" ] || kill -- "-$builder" 2>/dev/null || true' EXIT
+computing=""
+trap 'for group in $builder $computing; do kill -- "-$group" 2>/dev/null || true; done' EXIT
 echo "== release: building"
 SECONDS=0
 build release
@@ -188,15 +203,27 @@ for i in "${!presets[@]}"; do
     builder=$!
     set +m
   fi
+  if [ "$preset" = tsan ]; then
+    set -m
+    compute_beside_tests &
+    computing=$!
+    set +m
+  fi
   echo "== $preset: testing"
   test_start=$SECONDS
   status=0
   parallel=$((jobs + 1))
   # With no build beside them, there is time for more: most tests of threads wait.
   [ -n "$next" ] || [ "$preset" != tsan ] || parallel=$((2 * jobs + 1))
-  run_ctest "$preset" "build/$preset/test.log" --parallel "$parallel" || status=$?
+  run_ctest "$preset" "$(log_of "$preset")" --parallel "$parallel" || status=$?
   test_s=$((SECONDS - test_start))
   judge "$preset" "$status" "$build_s" "$test_s"
+  if [ -n "$computing" ]; then
+    status=0
+    wait "$computing" || status=$?
+    computing=""
+    judge asan-computing "$status" 0 "$((SECONDS - test_start))"
+  fi
   if [ -n "$builder" ]; then
     build_start=$SECONDS
     wait_for_build "$next" "$builder"

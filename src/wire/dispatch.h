@@ -26,37 +26,45 @@ Result<void> decodeAndHandle(ByteView payload, Handler& handler) {
 template <class Handler>
 using DispatchTable = std::array<Result<void> (*)(ByteView, Handler&), kMessageKinds>;
 
-template <class Handler, class... M>
-consteval DispatchTable<Handler> dispatchTable(MessageList<M...>) {
-  DispatchTable<Handler> table{};
-  ((table[static_cast<std::size_t>(kindOf<M>)] = &decodeAndHandle<M, Handler>), ...);
-  return table;
+// Null for the messages of other roles.
+template <Role R, class Handler, class M>
+consteval Result<void> (*entryFor())(ByteView, Handler&) {
+  if constexpr (M::kInfo.role == R) {
+    return &decodeAndHandle<M, Handler>;
+  } else {
+    return nullptr;
+  }
+}
+
+template <Role R, class Handler, class... All>
+consteval DispatchTable<Handler> dispatchTable(MessageList<All...>) {
+  return {entryFor<R, Handler, All>()...};
 }
 
 template <Role R, class Handler>
 Result<void> dispatch(MessageKind kind, ByteView payload, Handler& handler) {
   if (role(kind) != R) return wrongRole(kind, R);
-  static constexpr DispatchTable<Handler> kTable = dispatchTable<Handler>(MessagesWithRole<R>{});
+  static constexpr DispatchTable<Handler> kTable = dispatchTable<R, Handler>(AllMessages{});
   return kTable[static_cast<std::size_t>(kind)](payload, handler);
 }
 
 }  // namespace detail
 
-/// Whether a handler can be called with every struct of the list.
-template <class Handler, class... M>
-consteval bool handlesAll(MessageList<M...>) {
-  return (std::invocable<Handler&, const M&> && ...);
+/// Whether a handler can be called with every struct of a role among those of the list.
+template <Role R, class Handler, class... All>
+consteval bool handlesAll(MessageList<All...>) {
+  return ((All::kInfo.role != R || std::invocable<Handler&, const All&>)&&...);
 }
 
 /// Decodes a control message and calls `handler(const M&)` with it. The handler has one overload for each
-/// struct in ControlMessages; a missing one does not compile. An error is a malformed payload, or a kind of
+/// struct of that role; a missing one does not compile. An error is a malformed payload, or a kind of
 /// another role (a mistake of the caller: ask role() first), and then the handler is not called.
 template <class Handler>
 Result<void> dispatchControl(MessageKind kind, ByteView payload, Handler&& handler) {
   return detail::dispatch<Role::control>(kind, payload, handler);
 }
 
-/// The same for the structs in SceneMessages.
+/// The same for scene commands.
 template <class Handler>
 Result<void> dispatchScene(MessageKind kind, ByteView payload, Handler&& handler) {
   return detail::dispatch<Role::scene>(kind, payload, handler);

@@ -108,28 +108,7 @@ consteval std::array<MessageInfo, sizeof...(All)> infosOf(MessageList<All...>) {
   return {All::kInfo...};
 }
 
-template <Role R, class Result, class... All>
-struct WithRole {
-  using Type = Result;
-};
-template <Role R, class... Kept, class First, class... Rest>
-struct WithRole<R, MessageList<Kept...>, First, Rest...>
-    : WithRole<R,
-               std::conditional_t<First::kInfo.role == R, MessageList<Kept..., First>, MessageList<Kept...>>,
-               Rest...> {};
-
-template <Role R, class... All>
-typename WithRole<R, MessageList<>, All...>::Type withRole(MessageList<All...>);
-
 }  // namespace detail
-
-/// The messages that have this role, in the order of the table.
-template <Role R>
-using MessagesWithRole = decltype(detail::withRole<R>(AllMessages{}));
-using ControlMessages = MessagesWithRole<Role::control>;
-using SceneMessages = MessagesWithRole<Role::scene>;
-using ReportMessages = MessagesWithRole<Role::report>;
-static_assert(ControlMessages::kSize + SceneMessages::kSize + ReportMessages::kSize == kMessageKinds);
 
 /// Calls `visit.operator()<M>()` for each struct of the list, in order.
 template <class... M, class Visit>

@@ -2,14 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace hapticd::geometry {
 namespace {
 
-TEST(Rotation, IsTheOneOfEigen) {
+TEST(Rotation, TurnsByTheAngleBetweenAboutTheirNormal) {
   const Vec3 from(1, -2, 0.5);
-  for (const Vec3& to : {Vec3(3, 1, 2), Vec3(1, -2, 0.5), Vec3(-1, 2, -0.4), Vec3(0, 0, 7)}) {
-    EXPECT_EQ(rotationBetween(from, to).coeffs(), Quat::FromTwoVectors(from, to).coeffs()) << to.transpose();
+  for (const Vec3& to : {Vec3(3, 1, 2), Vec3(1, -2, 0.6), Vec3(-1, 2, -0.4), Vec3(0, 0, 7)}) {
+    const Vec3 normal = from.cross(to);
+    const Eigen::AngleAxisd turn(std::atan2(normal.norm(), from.dot(to)), normal.normalized());
+    EXPECT_TRUE(rotationBetween(from, to).isApprox(Quat(turn), 1e-12)) << to.transpose();
   }
+  EXPECT_TRUE(rotationBetween(from, 3 * from).isApprox(Quat::Identity(), 1e-15));
 }
 
 TEST(Rotation, OfOppositeDirectionsIsHalfATurn) {

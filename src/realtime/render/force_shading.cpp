@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "geometry/rotation.h"
+
 namespace hapticd::realtime {
 namespace {
 
@@ -124,7 +126,7 @@ Vec3 shadedAtEdge(const PlacedObject& object, const Vec3& normal, const Vec3& pl
   const Vec3 smooth = side * faces.mixtureNearestTo(side * normal, face);
   const double apart_rad = std::acos(std::clamp(smooth.dot(normal), -1.0, 1.0));
   const double share = std::max(0.0, 1 - apart_rad / kFades_rad);
-  return geometry::Quat::Identity().slerp(share, geometry::Quat::FromTwoVectors(smooth, shaded)) * normal;
+  return geometry::Quat::Identity().slerp(share, geometry::rotationBetween(smooth, shaded)) * normal;
 }
 
 }  // namespace

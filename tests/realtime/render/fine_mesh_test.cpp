@@ -228,8 +228,9 @@ TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
     for (int i = 0; i < 5; ++i) at({0, 0.0002, kRadius + 0.02});
     proxy->forget();
     felt.clear();
-    for (int i = 0; i < 2000; ++i) {
-      const double t = 0.001 * i;
+    constexpr int kTicks = reduced(2000);
+    for (int i = 0; i < kTicks; ++i) {
+      const double t = 2.0 * i / kTicks;
       at({0.001 * std::sin(7 * t), 0.0002 + 0.0007 * std::cos(5 * t),
           kRadius + 0.002 - 0.003 * std::min(1.0, t)});
     }

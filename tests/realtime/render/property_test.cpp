@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "meshes.h"
+#include "reduced.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -124,7 +125,7 @@ RC_GTEST_PROP(RendererProperty, force_does_not_depend_on_the_frame_or_the_unit, 
   std::optional<Hand> second;
   Vec3 hip = start;
   int differing = 0;
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < reduced(400, 100); ++i) {
     if (!first) {
       first.emplace(plain.snapshot());
       second.emplace(moved.snapshot());

@@ -11,6 +11,7 @@
 
 #include "realtime/servo/fakes.h"
 #include "realtime/servo/tick.h"
+#include "reduced.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -159,7 +160,7 @@ TEST(SceneAndRemote, walls_of_both_give_no_energy) {
 }
 
 TEST(SceneAndRemote, arm_that_is_let_go_between_walls_of_both_comes_to_rest) {
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(reduced(20)); ++seed) {
     std::mt19937 random(seed);
     const auto draw = [&](double from, double to) { return from + (to - from) * random() / 4294967296.0; };
     SharedPit pit(0.1);

@@ -171,19 +171,21 @@ TEST_F(CommandDecoderTest, CommandsWithTheMembersOfTheirMessageGetItsValuesInOrd
   std::set<std::string_view> withCommand;
   scene::forEachCommand([&]<class Command>() { withCommand.insert(Command::kInfo.message); });
   int compared = 0;
-  wire::forEachMessage(wire::SceneMessages{}, [&]<class M>() {
-    if (withCommand.count(M::kInfo.name) == 0) return;
-    M message;
-    NumberFiller expected;
-    M::fields(message, expected);
-    give(message);
-    const auto tasks = decoder_.release();
-    ASSERT_EQ(tasks.size(), 1U) << M::kInfo.name;
-    const auto [name, got] = valuesOf(std::get<scene::SceneCommand>(tasks[0].what));
-    EXPECT_EQ(name, M::kInfo.name);
-    EXPECT_EQ(got.numbers, expected.numbers) << M::kInfo.name;
-    EXPECT_EQ(got.text, expected.text) << M::kInfo.name;
-    ++compared;
+  wire::forEachMessage(wire::AllMessages{}, [&]<class M>() {
+    if constexpr (M::kInfo.role == wire::Role::scene) {
+      if (withCommand.count(M::kInfo.name) == 0) return;
+      M message;
+      NumberFiller expected;
+      M::fields(message, expected);
+      give(message);
+      const auto tasks = decoder_.release();
+      ASSERT_EQ(tasks.size(), 1U) << M::kInfo.name;
+      const auto [name, got] = valuesOf(std::get<scene::SceneCommand>(tasks[0].what));
+      EXPECT_EQ(name, M::kInfo.name);
+      EXPECT_EQ(got.numbers, expected.numbers) << M::kInfo.name;
+      EXPECT_EQ(got.text, expected.text) << M::kInfo.name;
+      ++compared;
+    }
   });
   EXPECT_GE(compared, 32);
 }
