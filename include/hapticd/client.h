@@ -59,9 +59,8 @@ struct UploadProgress {
 /// Commands (everything below "Scene") are collected and sent by the next poll(), flush(), or when 64 KiB
 /// have accumulated. Every command may therefore
 /// - sleep, while more than ClientOptions::queueLimit_bytes wait for a slow server,
-/// - throw ConnectionLost, when the server accepts no data for ClientOptions::sendTimeout or the connection
-/// ends during
-///   that sleep,
+/// - throw ConnectionLost, when the server accepts no data for ClientOptions::sendTimeout,
+///   or the connection ends during that sleep,
 /// - throw ConnectError, when more than queueLimit_bytes wait for the first connection.
 /// Commands before the first connection are kept for it. Commands while a later connection is lost are
 /// dropped and counted (Statistics::messagesDropped): a restarted server has an empty scene, so rebuild it

@@ -1,9 +1,8 @@
 // Hands the newest immutable value to a realtime thread, and returns old values to be freed by the publisher.
 //
 // Protocol, for one publisher and one reader:
-//   publish  wraps the value in a node and exchanges it into the mailbox. The reader never saw a node that
-//   comes
-//            out, so publish frees it at once.
+//   publish  wraps the value in a node and exchanges it into the mailbox. A node that comes out was never
+//            seen by the reader, so publish frees it at once.
 //   take     exchanges null into the mailbox. A node that comes out becomes the current one; the previous one
 //            stays readable until the next take and then returns through the ring.
 //   collect  frees the nodes in the return ring.

@@ -58,7 +58,7 @@ ExportFile::~ExportFile() {
       base::world().files.remove(written_);
     }
   } catch (const std::exception&) {
-    // Whoever needs the file whole calls close().
+    // A destructor cannot report it: callers that need the file whole call close().
   }
 }
 

@@ -109,6 +109,32 @@ void RecordingReader::takeWhole(RecordingEvent& event) {
   if (!in.ok() || !in.rest().empty()) fail("the length of an event does not match its content");
 }
 
+void RecordingReader::readMemory(MemoryEvent& memory) {
+  Unpacker in(block_.content);
+  memory.device = in.next<std::uint32_t>();
+  if (!unpackMemory(in, memory.memory) || !in.rest().empty()) fail("a damaged memory of a servo");
+  const auto part = remote_.find(memory.device);
+  if (part == remote_.end()) return;
+  if (part->second.tick == memory.memory.tick) memory.memory.remote = part->second.remote;
+  remote_.erase(part);
+}
+
+void RecordingReader::readRemoteMemory() {
+  Unpacker in(block_.content);
+  const auto device = in.next<std::uint32_t>();
+  if (device >= header_.devices.size() || !unpackRemoteMemory(in, remote_[device]) || !in.rest().empty())
+    fail("a damaged memory of a servo");
+}
+
+void RecordingReader::readWallOffset() {
+  WallOffsetRecord record;
+  Unpacker in(block_.content);
+  in.take(record);
+  if (!in.ok() || !in.rest().empty() || record.offset < -kLatest || record.offset > kLatest)
+    fail("a damaged wall offset");
+  wallOffsets_[record.time] = record.offset;
+}
+
 // False when the block is not an event by itself.
 bool RecordingReader::readBlock(RecordingEvent& event) {
   std::uint32_t device = 0;
@@ -135,24 +161,13 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       if (!unpackStream(in, stream.stream) || !in.rest().empty()) fail("a damaged streamed value");
       break;
     }
-    case BlockKind::memory: {
-      Unpacker in(block_.content);
-      MemoryEvent& memory = event.emplace<MemoryEvent>();
-      device = memory.device = in.next<std::uint32_t>();
-      if (!unpackMemory(in, memory.memory) || !in.rest().empty()) fail("a damaged memory of a servo");
-      if (const auto part = remote_.find(device); part != remote_.end()) {
-        if (part->second.tick == memory.memory.tick) memory.memory.remote = part->second.remote;
-        remote_.erase(part);
-      }
+    case BlockKind::memory:
+      readMemory(event.emplace<MemoryEvent>());
+      device = std::get<MemoryEvent>(event).device;
       break;
-    }
-    case BlockKind::remoteMemory: {
-      Unpacker in(block_.content);
-      device = in.next<std::uint32_t>();
-      if (device >= header_.devices.size() || !unpackRemoteMemory(in, remote_[device]) || !in.rest().empty())
-        fail("a damaged memory of a servo");
+    case BlockKind::remoteMemory:
+      readRemoteMemory();
       return false;
-    }
     case BlockKind::left:
       takeWhole<LeftEvent>(event);
       if (std::get<LeftEvent>(event).time < 0 || std::get<LeftEvent>(event).time > kLatest)
@@ -166,15 +181,9 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
         lost_[kind] += lost.count;
       break;
     }
-    case BlockKind::wallOffset: {
-      WallOffsetRecord record;
-      Unpacker in(block_.content);
-      in.take(record);
-      if (!in.ok() || !in.rest().empty() || record.offset < -kLatest || record.offset > kLatest)
-        fail("a damaged wall offset");
-      wallOffsets_[record.time] = record.offset;
+    case BlockKind::wallOffset:
+      readWallOffset();
       return false;
-    }
     case BlockKind::marker:
       takeWhole<MarkerEvent>(event);
       std::get<MarkerEvent>(event).text = base::printable(std::get<MarkerEvent>(event).text);

@@ -40,6 +40,9 @@ class RecordingReader {
   bool readBlock(RecordingEvent& event);
   template <class Event>
   void takeWhole(RecordingEvent& event);
+  void readMemory(MemoryEvent& memory);
+  void readRemoteMemory();
+  void readWallOffset();
   [[noreturn]] void fail(const std::string& what) const;
 
   std::filesystem::path path_;

@@ -148,7 +148,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   if (entry.value.running) tellOfSum(call);
 }
 
-// Whoever makes them too many is told.
+// Warns the client whose effect brings the sum above the passivity bound.
 void FreeForces::tellOfSum(const Call& call) const {
   const double load = bound_.loadOf(sumOfEffects());
   if (load == 0) return;

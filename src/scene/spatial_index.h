@@ -1,7 +1,7 @@
 // Bounding-box tree over numbered boxes (Embree), for triangles of a mesh and for objects of a scene.
 //
 // It only proposes: every box is padded by more than the float error of the tree, so each query visits a
-// superset of the boxes it touches. Whoever asks decides in double precision and breaks ties by the lowest
+// superset of the boxes it touches. The caller decides in double precision and breaks ties by the lowest
 // id, because the order of visits is not defined.
 #pragma once
 

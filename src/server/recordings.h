@@ -40,7 +40,7 @@ class Recordings {
   void begin(base::Nanos wallOffset, std::string config);
   /// Gets a text for the client: why the recording was refused, or nothing when it records to file().
   using Begun = std::function<void(const std::string& refusal)>;
-  /// Who gets a text once the file is complete.
+  /// The client that gets a text once the file is complete.
   struct Listener {
     scene::ClientId client = 0;
     std::function<void(const std::string&)> tell;

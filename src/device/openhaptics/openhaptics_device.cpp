@@ -317,7 +317,7 @@ std::string OpenHapticsDevice::faultText() const {
   const std::uint32_t hold = hold_;
   std::string words;
   const auto say = [&](const std::string& sentence) { words += (words.empty() ? "" : "; ") + sentence; };
-  // A force error holds for a moment only: who asks later still learns of it.
+  // A force error holds for a moment only; later callers still get its text.
   if (unreported_.exchange(false) || (hold & kHoldFault) != 0) {
     const hd::Enum code = lastError_;
     if (silent_) {

@@ -214,6 +214,9 @@ class ContactQuery {
   static constexpr int kScansOfOne = 6;  // discs that a cast looks at, for a sixteenth
   static constexpr int kMaxUnfit = 8;
   static constexpr double kReserveShare = 0.2;  // of the tool radius, that is gathered in reserve at most
+  static constexpr double kWiden = 1 + 1e-6;    // covers the rounding of queries that change frames
+  static constexpr double kSmallestGather_m = 10e-6;
+  static constexpr double kAside = 0.05;  // of a way that is gathered: how far a ball may leave it
 
   class JoinedFans;
 

@@ -25,9 +25,10 @@ double exitOfBall(const Vec3& p, const Vec3& d, const Vec3& centre, double radiu
 /// Servo thread: noexcept, no allocation.
 class FacetCache {
  public:
-  static constexpr int kMaxFacets = 512;  ///< for a point tool
-  static constexpr int kMaxTriangles =
-      8192;  ///< for a ball tool; a bowl of its radius is within reach as a whole
+  /// For a point tool.
+  static constexpr int kMaxFacets = 512;
+  /// For a ball tool: a bowl of its radius is within reach as a whole.
+  static constexpr int kMaxTriangles = 8192;
 
   /// A triangle of a near object, both by index.
   struct TriangleId {

@@ -111,7 +111,7 @@ std::optional<Identity> Credentials::check(std::string_view token, const std::st
     if (equalInConstantTime(each.text, token)) found = &each;
   }
   if (found != nullptr) return Identity{found->role, true};
-  // Whoever has very many sources must not keep others from presenting a token.
+  // A client with very many addresses must not keep others from presenting a token.
   if (known == failures_.end() && failures_.size() >= kMostSources) {
     const auto earlier = [](const auto& a, const auto& b) { return a.second.since < b.second.since; };
     failures_.erase(std::min_element(failures_.begin(), failures_.end(), earlier));

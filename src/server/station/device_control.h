@@ -32,7 +32,7 @@ class DeviceControl {
   };
   static constexpr base::Nanos kLongestTravel = 10'000'000'000;
 
-  /// Who gives an order.
+  /// The client that stops, re-arms or holds.
   struct Sender {
     scene::ClientId client = 0;
     std::uint64_t key = 0;      ///< that the connections of one program share; 0: none

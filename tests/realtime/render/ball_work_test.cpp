@@ -77,9 +77,8 @@ TriangleMesh trough(double radius, int needles) {
   return mesh;
 }
 
-//    .---.       1 m/s over cells of 0.1 mm: 2100 triangles within the reach of a ball of 1 mm in a tick, 10
-//    000
-//   (  -> )      of 5 mm; its way comes near few
+//    .---.       1 m/s over cells of 0.1 mm: 2100 triangles are within the reach of a ball of 1 mm
+//   (  -> )      in a tick, 10 000 of one of 5 mm; its way comes near few
 //  __'---'__
 TEST(WorkOfABall, follows_its_way_over_a_fine_mesh) {
   struct Case {
@@ -105,9 +104,8 @@ TEST(WorkOfABall, follows_its_way_over_a_fine_mesh) {
   }
 }
 
-//  |  .---.  |   a ball in a bowl a little larger: all of it, more than a tick can gather, is within 0.5 mm
-//  of
-//   \(     )/    each place of the ball
+//  |  .---.  |   a ball in a bowl a little larger: all of it, more than a tick can gather,
+//   \(     )/    is within 0.5 mm of each place of the ball
 //    `-._.-'
 TEST(WorkOfABall, lets_it_feel_a_fine_bowl_a_little_larger) {
   constexpr double kRadius_m = 0.005;

@@ -104,9 +104,8 @@ TEST_P(FineMeshTest, seams_of_a_flat_grid_are_not_felt) {
 
 // More triangles within a ball's radius than a tick can gather.
 //
-//    .-----.      pushed through a sheet: 1000 N/m up to 0.5 N, and through as soon as there is room behind
-//    it
-//   (       )
+//    .-----.
+//   (       )     pushed through a sheet: 1000 N/m up to 0.5 N, and through once there is room behind it
 //  --'-----'--
 TEST(FineSheet, lets_a_ball_through_at_its_force) {
   constexpr double kRadius = 0.002;

@@ -1,76 +1,26 @@
-// The laws of remote contacts and held forces against closed forms.
+// The law of remote contacts against closed forms.
 #include <gtest/gtest.h>
 
-#include <functional>
-#include <random>
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "base/time.h"
-#include "realtime/remote/held_force.h"
 #include "realtime/remote/normal_shares.h"
 #include "realtime/remote/remote_contacts.h"
+#include "realtime/remote/remote_input.h"
+#include "realtime/servo/remote_rig.h"
 #include "reduced.h"
 
 namespace hapticd::realtime {
 namespace {
-
-constexpr Nanos kMs = 1'000'000;
-constexpr double kRate_N_per_ms = 0.3;
-constexpr double kExact_N = 1e-9;
-
-RemoteContact floorAt(double height_m, double stiffness = 800) {
-  RemoteContact c;
-  c.point_m = {0.02, height_m, -0.01};
-  c.normal = Vec3::UnitY();
-  c.stiffness_N_per_m = stiffness;
-  return c;
-}
-
-// A servo of 1 kHz and a client that states whatever the test sets.
-struct Rig {
-  RemoteContacts law;
-  RemoteContactSet set;
-  RemoteHand hand;
-  RemoteRendering out;
-  Vec3 force = Vec3::Zero();
-  Nanos now = 1000 * kMs;
-
-  void state(std::vector<RemoteContact> contacts) {
-    ++set.number;
-    set.received = set.stated = now;
-    set.count = static_cast<std::uint32_t>(contacts.size());
-    std::copy(contacts.begin(), contacts.end(), set.contacts.begin());
-  }
-  // The servo counts a late tick for no more than two.
-  const Vec3& step(Nanos late = 0) {
-    now += kMs + late;
-    out = {};
-    force = law.step(set, hand, now, base::toSeconds(kMs + std::min(late, kMs)), out);
-    return force;
-  }
-  // States the same every 16 ms.
-  void settle(const std::vector<RemoteContact>& contacts, int ticks) {
-    for (int i = 0; i < ticks; ++i) {
-      if (i % 16 == 0) state(contacts);
-      step();
-    }
-  }
-  // From outside to the place, so that nothing appears around the hand.
-  void approach(const std::vector<RemoteContact>& contacts, const Vec3& from, const Vec3& to) {
-    for (int i = 0; i <= 100; ++i) {
-      hand.position_m = from + i / 100.0 * (to - from);
-      if (i % 16 == 0) state(contacts);
-      step();
-    }
-  }
-};
 
 void expectNear(const Vec3& a, const Vec3& b, double tolerance) {
   EXPECT_LE((a - b).norm(), tolerance) << a.transpose() << " instead of " << b.transpose();
 }
 
 TEST(RemoteContacts, HalfSpaceIsASpringFromTheFirstTouch) {
-  Rig rig;
+  RemoteRig rig;
   rig.state({floorAt(0)});
   for (double y = 0.001; y > -0.003; y -= 0.0001) {
     rig.hand.position_m = {0, y, 0};
@@ -84,7 +34,7 @@ TEST(RemoteContacts, HalfSpaceIsASpringFromTheFirstTouch) {
 }
 
 TEST(RemoteContacts, SphereStaysRoundBetweenUpdates) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact ball = floorAt(0);
   ball.shape = RemoteShape::sphere;
   ball.radius_m = 0.030;
@@ -95,7 +45,7 @@ TEST(RemoteContacts, SphereStaysRoundBetweenUpdates) {
     expectNear(rig.force, 800 * 0.0015 * out, 1e-6);
   }
   // The same from inside a hollow sphere: it pushes to the centre.
-  Rig hollow;
+  RemoteRig hollow;
   ball.radius_m = -0.030;
   ball.normal = -Vec3::UnitY();
   hollow.approach({ball}, {0.028, 0, 0}, {0.0315, 0, 0});
@@ -103,7 +53,7 @@ TEST(RemoteContacts, SphereStaysRoundBetweenUpdates) {
 }
 
 TEST(RemoteContacts, CylinderIsFlatAlongItsAxis) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact rod = floorAt(0);
   rod.shape = RemoteShape::cylinder;
   rod.radius_m = 0.010;
@@ -115,7 +65,7 @@ TEST(RemoteContacts, CylinderIsFlatAlongItsAxis) {
 }
 
 TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
-  Rig rig;
+  RemoteRig rig;
   rig.hand.position_m = {0, -0.001, 0};
   RemoteContact rising = floorAt(-0.002);
   rising.point_m.setZero();
@@ -125,7 +75,7 @@ TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
   for (int ms = 1; ms <= 30; ++ms)
     expectNear(rig.step(), {0, 800 * std::max(0.0, 1e-4 * ms - 0.001), 0}, 1e-9);
 
-  Rig turning;
+  RemoteRig turning;
   RemoteContact wheel = floorAt(0);
   wheel.point_m.setZero();
   wheel.angularVelocity_rad_per_s = {0, 0, 2};
@@ -137,7 +87,7 @@ TEST(RemoteContacts, SurfacesMoveByTheirVelocities) {
   const double depth = -normal.dot(turning.hand.position_m);
   EXPECT_LT(depth, 0) << "the surface turns away on this side";
   turning.hand.position_m = {0.02, 0.0001, 0};
-  Rig other;
+  RemoteRig other;
   other.hand.position_m = {0.02, 0.0001, 0};
   other.state({wheel});
   for (int ms = 1; ms <= 40; ++ms) other.step();
@@ -150,7 +100,7 @@ TEST(RemoteContacts, RoundSurfacesTurnAboutTheirCentre) {
     for (const double radius_m : {0.02, 0.05, -0.02}) {
       const Vec3 centre_m(0, -radius_m, 0);
       const Vec3 spin_rad_per_s(0, 0, -19);
-      Rig rig;
+      RemoteRig rig;
       for (int ms = 0; ms < 2000; ++ms) {
         rig.hand.position_m.y() = std::max(-0.001, 0.002 - 2e-5 * ms);
         if (ms % 33 == 0) {
@@ -178,7 +128,7 @@ TEST(RemoteContacts, FlatSurfacesTurnAboutTheirHinge) {
   constexpr double kHand_m = 0.1;  // from the hinge
   constexpr double kSpeed_rad_per_s = 5;
   for (const double stated_m : {0.1, 0.07, 0.13}) {
-    Rig rig;
+    RemoteRig rig;
     const auto along = [](double angle) { return Vec3(std::cos(angle), std::sin(angle), 0); };
     const auto normal = [](double angle) { return Vec3(-std::sin(angle), std::cos(angle), 0); };
     for (int ms = 0; ms < 400; ++ms) {
@@ -201,417 +151,8 @@ TEST(RemoteContacts, FlatSurfacesTurnAboutTheirHinge) {
   }
 }
 
-// Draws in the order of the calls, whatever the compiler.
-class Draw {
- public:
-  explicit Draw(int seed) : random_(static_cast<unsigned>(seed)) {}
-  double operator()() { return unit_(random_); }
-  Vec3 vector() {
-    const double x = unit_(random_);
-    const double y = unit_(random_);
-    return {x, y, unit_(random_)};
-  }
-  Vec3 nearlyUp(double spread) {
-    const double x = spread * unit_(random_);
-    return Vec3(x, 1, spread * unit_(random_)).normalized();
-  }
-
- private:
-  std::mt19937 random_;
-  std::uniform_real_distribution<double> unit_{-1, 1};
-};
-
-RemoteContact movingFloor(Draw& draw) {
-  const double height_m = 0.002 * draw();
-  RemoteContact c = floorAt(height_m, 300 + 250 * draw());
-  c.normal = draw.nearlyUp(0.3);
-  c.velocity_m_per_s = 0.02 * draw.vector();  // 0.01 N/ms, which is no step of an update
-  c.damping_Ns_per_m = 1 + draw();
-  c.yields = true;
-  return c;
-}
-
-// The largest change of the force in a tick, with an update every 17 ms and the hand at rest or along x.
-double largestStep(int ticks, const std::function<std::vector<RemoteContact>()>& contacts,
-                   double speed_m_per_s = 0) {
-  Rig rig;
-  Vec3 last = Vec3::Zero();
-  double largest = 0;
-  for (int ms = 0; ms < ticks; ++ms) {
-    if (ms % 17 == 0) rig.state(contacts());
-    rig.hand.velocity_m_per_s.x() = speed_m_per_s;
-    rig.hand.position_m.x() += 1e-3 * speed_m_per_s;
-    const Vec3 force = rig.step();
-    largest = std::max(largest, (force - last).norm());
-    last = force;
-  }
-  EXPECT_GT(largest, 0.01) << "nothing is felt";
-  return largest;
-}
-
-// Whatever a client states, many contacts too. One has friction, with equal coefficients: a slip from one to
-// the other is no update.
-TEST(RemoteContacts, NoUpdateMakesAStep) {
-  for (const int most : {1, 3, 16}) {
-    for (int seed = 0; seed < (most == 1 ? 200 : 20); ++seed) {
-      Draw draw(seed);
-      const double largest = largestStep(3000, [&] {
-        std::vector<RemoteContact> contacts;
-        for (int id = 0; id < most; ++id) {
-          if (draw() > 0.5) continue;
-          RemoteContact c = movingFloor(draw);
-          c.id = id;
-          if (most == 1) c.staticFriction = c.dynamicFriction = 0.3 + 0.3 * draw();
-          c.lifetime = 40 * kMs;
-          contacts.push_back(c);
-        }
-        return contacts;
-      });
-      EXPECT_LT(largest, kRate_N_per_ms) << most << " contacts, seed " << seed;
-    }
-  }
-}
-
-// The static coefficient falls below the one with which the tool still slides, which must follow it down.
-TEST(RemoteContacts, FallingFrictionLetsTheToolSlipSlowly) {
-  Rig rig;
-  RemoteContact c = floorAt(0);
-  c.staticFriction = c.dynamicFriction = 0.8;
-  rig.approach({c}, {0, 0.001, 0}, {0, -0.004, 0});
-  for (int i = 0; i < 30; ++i) {
-    rig.hand.position_m.x() += 5e-5;
-    if (i % 16 == 0) rig.state({c});
-    rig.step();
-  }
-  c.staticFriction = c.dynamicFriction = 0.05;
-  rig.state({c});
-  double last_N = -rig.force.x();
-  ASSERT_GT(last_N, 0.3);
-  for (int ms = 0; ms < 40; ++ms) {
-    const double friction_N = -rig.step().x();
-    EXPECT_LE(friction_N, last_N + kExact_N) << ms << " ms after the update";
-    EXPECT_GT(friction_N, last_N - kRate_N_per_ms) << ms << " ms after the update";
-    last_N = friction_N;
-  }
-  EXPECT_NEAR(last_N, 0.05 * 3.2, 1e-6);
-}
-
-// A face that comes to bear goes on with the friction of the one that bore before; a softer one with what
-// holds the same energy.
-TEST(RemoteContacts, AnotherBearerTakesTheFrictionOver) {
-  for (const double stiffness : {800.0, 1600.0, 200.0}) {
-    Rig rig;
-    RemoteContact lower = floorAt(0);
-    lower.staticFriction = lower.dynamicFriction = 0.5;
-    RemoteContact rising = lower;
-    rising.id = 1;
-    rising.stiffness_N_per_m = stiffness;
-    rising.point_m.y() = -0.001;
-    rising.velocity_m_per_s.y() = 0.5;
-    rising.yields = true;
-    rig.approach({lower}, {0, 0.001, 0}, {0, -0.003, 0});
-    for (int i = 0; i < 8; ++i) {
-      rig.hand.position_m.x() += 5e-5;
-      rig.step();
-    }
-    const double friction_N = -0.5 * 800 * 4e-4;
-    rig.state({lower, rising});
-    const double kept_N = std::min(1.0, std::sqrt(stiffness / 800)) * friction_N;
-    double last_N = friction_N;
-    for (int ms = 0; ms < 40; ++ms) {
-      const double now_N = rig.step().x();
-      EXPECT_GE(now_N, last_N - kExact_N) << ms;
-      EXPECT_LE(now_N, std::min(kept_N, last_N + 0.01) + kExact_N) << ms;
-      last_N = now_N;
-    }
-    EXPECT_NEAR(last_N, kept_N, kExact_N);
-    ASSERT_EQ(rig.out.count, 1U);
-    EXPECT_EQ(rig.out.contacts[0].id, 1) << "it has risen past the other";
-  }
-}
-
-// Where the client states equal coefficients, no slip finds them apart while they follow an update.
-TEST(RemoteContacts, EqualCoefficientsStayEqual) {
-  for (const int seed : {1, 4, 345}) {
-    Draw draw(seed);
-    const double largest = largestStep(
-        3000,
-        [&] {
-          std::vector<RemoteContact> contacts;
-          const double friction = 0.3 + 0.3 * draw();
-          if (draw() > 0.6) return contacts;
-          RemoteContact c = movingFloor(draw);
-          c.staticFriction = c.dynamicFriction = friction;
-          contacts.push_back(c);
-          return contacts;
-        },
-        0.05);
-    EXPECT_LT(largest, kRate_N_per_ms) << "seed " << seed;
-  }
-}
-
-// Faces with friction that nearly coincide. Seeds in which the friction of one that no longer bore was lost.
-TEST(RemoteContacts, OtherBearersWithFrictionMakeNoStep) {
-  for (const int seed : {51, 67, 82}) {
-    Draw draw(seed);
-    const double largest = largestStep(3000, [&] {
-      std::vector<RemoteContact> contacts;
-      for (int id = 0; id < 5; ++id) {
-        if (draw() > 0.6) continue;
-        RemoteContact c = movingFloor(draw);
-        c.id = id;
-        c.staticFriction = c.dynamicFriction = 0.3 + 0.3 * draw();
-        contacts.push_back(c);
-      }
-      return contacts;
-    });
-    EXPECT_LT(largest, kRate_N_per_ms) << "seed " << seed;
-  }
-}
-
-std::vector<RemoteContact> facesAnywhere(Draw& draw) {
-  std::vector<RemoteContact> contacts;
-  for (int id = 0; id < 5; ++id) {
-    if (draw() > 0.6) continue;
-    const double height_m = 0.002 * draw();
-    RemoteContact c = floorAt(height_m, 300 + 250 * draw());
-    c.id = id;
-    do c.normal = draw.vector();
-    while (c.normal.norm() > 1 || c.normal.norm() < 0.1);
-    c.normal.normalize();
-    c.damping_Ns_per_m = 1 + draw();
-    c.yields = true;
-    contacts.push_back(c);
-  }
-  return contacts;
-}
-
-// Four faces of which three touch in a row make the demands' system indefinite: from one tick to the next
-// others bear. Seeds of arbitrary normals in which the sum jumped by up to 0.8 N.
-TEST(RemoteContacts, OtherBearersMakeNoStep) {
-  for (const int seed : {197, 471, 647, 1173, 1427, 1949}) {
-    Draw draw(seed);
-    EXPECT_LT(largestStep(3000, [&] { return facesAnywhere(draw); }), kRate_N_per_ms) << "seed " << seed;
-  }
-}
-
-// In a corner the sum changes faster than what each face demands. Without friction, whose slip is no update.
-TEST(RemoteContacts, NoUpdateOfACornerMakesAStep) {
-  for (const bool comeAndGo : {false, true}) {
-    for (const int faces : {2, 3, 5}) {
-      for (int seed = 0; seed < reduced(60); ++seed) {
-        Draw draw(seed);
-        const double largest = largestStep(3000, [&] {
-          std::vector<RemoteContact> contacts;
-          for (int id = 0; id < faces; ++id) {
-            if (comeAndGo && draw() > 0.6) continue;  // it fades
-            const double stiffness = 300 + 250 * draw();
-            RemoteContact c = floorAt(0.002 * draw(), stiffness);
-            c.id = id;
-            c.normal = draw.nearlyUp(0.3);
-            c.damping_Ns_per_m = 1 + draw();
-            c.yields = true;
-            contacts.push_back(c);
-          }
-          return contacts;
-        });
-        EXPECT_LT(largest, kRate_N_per_ms)
-            << faces << " faces, seed " << seed << (comeAndGo ? ", some absent" : "");
-      }
-    }
-  }
-}
-
-// The surface stays where it is stated: a hand that leaves it feels nothing outside, and gets no more than
-// the spring held.
-TEST(RemoteContacts, ASurfaceThatSoftensIsNotFeltOutside) {
-  for (const double softer : {300.0, 100.0, 20.0, 1.0}) {
-    Rig rig;
-    rig.approach({floorAt(0, 1000)}, {0, 0.001, 0}, {0, -0.003, 0});
-    rig.settle({floorAt(0, 1000)}, 16);
-    double work_J = 0;
-    for (int ms = 0; ms < 400; ++ms) {
-      if (ms % 16 == 0) rig.state({floorAt(0, softer)});
-      const Vec3 before_N = rig.force;
-      rig.hand.position_m.y() += 0.0002;
-      rig.step();
-      work_J += 0.5 * 0.0002 * (before_N + rig.force).y();
-      if (rig.hand.position_m.y() > 0) {
-        ASSERT_EQ(rig.force.norm(), 0) << softer << " N/m, " << ms << " ms";
-      }
-    }
-    EXPECT_LE(work_J, 0.5 * 3 * 0.003 + 1e-9) << softer << " N/m";
-  }
-}
-
-// Surfaces on top of each other take one spring from the hand, and give back no more when they fade or
-// soften: else the one that stays would push it out with what was never taken.
-TEST(RemoteContacts, CoincidentSurfacesGiveBackOneSpring) {
-  for (const bool soften : {false, true}) {
-    double worked_J[2] = {};
-    for (const int floors : {1, 16}) {
-      Rig rig;
-      const auto all = [&](double stiffness) {
-        std::vector<RemoteContact> set(static_cast<std::size_t>(floors), floorAt(0, stiffness));
-        for (int i = 0; i < floors; ++i) set[static_cast<std::size_t>(i)].id = i;
-        return set;
-      };
-      double& work_J = worked_J[floors > 1];
-      const auto follow = [&](const std::vector<RemoteContact>& set, double to_m, int ticks) {
-        const double from_m = rig.hand.position_m.y();
-        for (int i = 1; i <= ticks; ++i) {
-          if (i % 8 == 1) rig.state(set);
-          const double before_N = rig.force.y();
-          const double before_m = rig.hand.position_m.y();
-          rig.hand.position_m.y() = from_m + (to_m - from_m) * i / ticks;
-          rig.step();
-          work_J += 0.5 * (before_N + rig.force.y()) * (rig.hand.position_m.y() - before_m);
-        }
-      };
-      rig.hand.position_m = {0, 0.001, 0};
-      for (int round = 0; round < 10; ++round) {
-        follow(all(1000), 0.001, 20);
-        follow(all(1000), -0.0025, 20);
-        follow(soften ? all(1) : std::vector<RemoteContact>{floorAt(0, 1000)}, -0.0025, 460);
-        follow({floorAt(0.006, 1000)}, -0.0025, 60);  // rises, and does not say so
-        follow({floorAt(0.006, 1000)}, 0.0075, 60);
-        follow({}, 0.0075, 20);
-        follow({}, 0.001, 20);
-      }
-    }
-    EXPECT_NEAR(worked_J[1], worked_J[0], 0.005) << (soften ? "softened" : "faded");
-  }
-}
-
-TEST(RemoteContacts, LifeIncludesTheFade) {
-  Rig rig;
-  RemoteContact c = floorAt(0);
-  c.lifetime = 60 * kMs;
-  rig.approach({c}, {0, 0.001, 0}, {0, -0.004, 0});
-  ASSERT_NEAR(rig.force.y(), 3.2, 1e-6);
-  rig.state({c});
-  const Nanos received = rig.now;
-  double last = rig.force.y();
-  while (rig.now < received + 60 * kMs) {
-    const double force = rig.step().y();
-    EXPECT_LE(force, last + kExact_N);
-    EXPECT_GE(force, last - kRate_N_per_ms);
-    if (rig.now <= received + 30 * kMs) {
-      EXPECT_NEAR(force, 3.2, 1e-6);
-    }
-    last = force;
-  }
-  EXPECT_EQ(last, 0);
-  EXPECT_EQ(rig.out.count, 0U);
-}
-
-// Two walls of a groove, or a floor, pressed with a force that the client's updates find at rest.
-std::vector<RemoteContact> floorOrGroove(int walls, double stiffness, Nanos lifetime) {
-  RemoteContact c = floorAt(0, stiffness);
-  c.point_m.setZero();
-  c.lifetime = lifetime;
-  if (walls == 1) return {c};
-  c.normal = Vec3(1, 1, 0).normalized();
-  RemoteContact other = c;
-  other.id = 1;
-  other.normal.x() = -other.normal.x();
-  return {c, other};
-}
-
-// Within two thirds of their life.
-TEST(RemoteContacts, ThoseRepeatedInTimeDoNotFade) {
-  struct Client {
-    int every_ms;
-    int life_ms;
-  };
-  for (const Client client : {Client{33, 100}, {10, 40}, {33, 50}, {1, 10}, {4, 10}, {10, 30}}) {
-    for (const int walls : {1, 2}) {
-      for (const double force_N : {2.0, 5.0, 11.0}) {
-        if (force_N > client.life_ms - client.every_ms - 2) continue;  // it may fall by 1 N/ms
-        const auto contacts = floorOrGroove(walls, 1000, client.life_ms * kMs);
-        Rig rig;
-        for (int ms = 0; ms < 4000; ++ms) {
-          rig.hand.position_m.y() = std::max(-1e-3 * force_N, 0.002 - 2e-5 * ms);
-          if (ms % client.every_ms == 0) rig.state(contacts);
-          rig.step();
-          ASSERT_NEAR(rig.force.y(), 1e3 * std::max(0.0, -rig.hand.position_m.y()), 1e-6)
-              << force_N << " N, every " << client.every_ms << " ms for " << client.life_ms << " ms, "
-              << walls;
-        }
-      }
-    }
-  }
-}
-
-// The hand gave what a fade took: it does not empty the tank of corrections.
-TEST(RemoteContacts, WhatAFadeTookComesBack) {
-  for (const int walls : {1, 2}) {
-    for (const double stiffness : {200.0, 1000.0}) {
-      const auto contacts = floorOrGroove(walls, stiffness, 100 * kMs);
-      Rig rig;
-      constexpr double kForce_N = 3;
-      int next_ms = 0;
-      for (int ms = 0; ms < 8000; ++ms) {
-        rig.hand.position_m.y() = std::max(-kForce_N / stiffness, 0.002 - 2e-5 * ms);
-        if (ms >= next_ms) {
-          const bool stall = ms > 2000 && ms % 300 < 10;
-          if (stall) {
-            ASSERT_NEAR(rig.force.y(), kForce_N, 1e-6) << "before the stall at " << ms;
-          }
-          rig.state(contacts);
-          next_ms = ms + (stall ? 90 : 10);
-        }
-        rig.step();
-        ASSERT_EQ(rig.out.status & kRemoteCorrectionsHeld, 0U) << ms;
-      }
-    }
-  }
-}
-
-TEST(RemoteContacts, AStrongForceOfALostClientEndsInTimeWithoutAStep) {
-  for (const int life_ms : {30, 50, 100}) {
-    for (const int walls : {1, 2}) {
-      const auto contacts = floorOrGroove(walls, 1500, life_ms * kMs);
-      Rig rig;
-      for (int ms = 0; ms < 500; ++ms) {
-        rig.hand.position_m.y() = std::max(-0.010, 0.002 - 4e-5 * ms);
-        if (ms % 4 == 0) rig.state(contacts);
-        rig.step();
-      }
-      ASSERT_NEAR(rig.force.y(), 15, 1e-6);
-      rig.state(contacts);
-      const Nanos received = rig.now;
-      while (rig.now < received + life_ms * kMs) {
-        const Vec3 last_N = rig.force;
-        EXPECT_LE((rig.step() - last_N).norm(), 1) << life_ms << " ms, " << walls << " walls";
-      }
-      EXPECT_EQ(rig.force, Vec3::Zero());
-    }
-  }
-}
-
-TEST(RemoteContacts, AbsentOnesFadeAtOnce) {
-  Rig rig;
-  RemoteContact side = floorAt(0);
-  side.id = 1;
-  side.point_m.setZero();
-  side.normal = Vec3::UnitX();
-  rig.approach({floorAt(0), side}, {0.001, 0.001, 0}, {-0.002, -0.002, 0});
-  ASSERT_NEAR(rig.force.x(), 1.6, 1e-6);
-  rig.state({floorAt(0)});
-  double last = rig.force.x();
-  int ms = 0;
-  for (; last > 0 && ms < 100; ++ms) {
-    rig.step();
-    EXPECT_GE(rig.force.x(), last - kRate_N_per_ms);
-    EXPECT_NEAR(rig.force.y(), 1.6, 1e-6);
-    last = rig.force.x();
-  }
-  EXPECT_LT(ms, 20);
-}
-
 TEST(RemoteContacts, SurfacesOnTopOfEachOtherAreAsStiffAsOne) {
-  Rig rig;
+  RemoteRig rig;
   std::vector<RemoteContact> contacts;
   for (int id = 0; id < 16; ++id) {
     contacts.push_back(floorAt(0));
@@ -690,7 +231,7 @@ TEST(RemoteContacts, ContactsThatBoreForceAndNowDemandAPullHaveNoShare) {
 
 TEST(RemoteContacts, UnequalSurfacesOnTopOfEachOtherExertTheLargerForce) {
   for (const double height_m : {-0.001, 0.0, 0.0005, 0.001, 0.004}) {
-    Rig rig;
+    RemoteRig rig;
     const RemoteContact hard = floorAt(0, 1000);
     RemoteContact soft = floorAt(height_m, 300);
     soft.id = 1;
@@ -702,7 +243,7 @@ TEST(RemoteContacts, UnequalSurfacesOnTopOfEachOtherExertTheLargerForce) {
 // Faces around the bottom of a hollow, and a hand that comes from outside, goes round in circles of 1 mm
 // inside the faces, and leaves. The work is that of the hand on them, by the trapezoidal rule.
 struct Hollow {
-  Rig rig;
+  RemoteRig rig;
   std::vector<RemoteContact> faces;
   double work_J = 0;
   int ticks = 0;
@@ -804,7 +345,7 @@ TEST(RemoteContacts, TremorInACornerDoesNotWearFrictionOut) {
 // Each demands its spring force along its normal: the forces of a corner of 60 degrees are solved, not
 // summed.
 TEST(RemoteContacts, CornersExertWhatEachFaceDemands) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact a = floorAt(0);
   a.point_m.setZero();
   a.normal = Vec3(std::sin(0.5), std::cos(0.5), 0);
@@ -817,7 +358,7 @@ TEST(RemoteContacts, CornersExertWhatEachFaceDemands) {
 }
 
 TEST(RemoteContacts, FrictionSticksAndSlides) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact c = floorAt(0);
   c.staticFriction = 0.5;
   c.dynamicFriction = 0.3;
@@ -839,7 +380,7 @@ TEST(RemoteContacts, FrictionSticksAndSlides) {
 TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
   constexpr double kSpeed_m_per_s = 0.1;
   for (const Nanos late : {2 * kMs, 5 * kMs, 14 * kMs}) {
-    Rig rig;
+    RemoteRig rig;
     const Nanos began = rig.now;
     const auto travelled = [&](Nanos at) { return kSpeed_m_per_s * base::toSeconds(at - began); };
     for (int i = 0; i < 1500; ++i) {
@@ -861,7 +402,7 @@ TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
 
 // A recording that begins between both does not know that the view moved: it must not matter.
 TEST(RemoteContacts, AViewThatMovedBeforeThemDoesNotMoveThem) {
-  Rig rig;
+  RemoteRig rig;
   rig.hand.position_m = {0, 0.001, 0};
   rig.law.moveWithView(geometry::Affine::Identity());
   rig.step();
@@ -872,7 +413,7 @@ TEST(RemoteContacts, AViewThatMovedBeforeThemDoesNotMoveThem) {
 TEST(RemoteContacts, TheSlowestTurnIsNone) {
   RemoteContact floor = floorAt(0);
   floor.angularVelocity_rad_per_s = {1e-321, 0, 1e-200};  // whose norm is 0 in double precision
-  Rig rig;
+  RemoteRig rig;
   rig.approach({floor}, {0, 0.01, 0}, {0, -0.001, 0});
   rig.settle({floor}, 100);
   EXPECT_NEAR(rig.force.y(), 0.8, kExact_N);
@@ -882,7 +423,7 @@ TEST(RemoteContacts, TheSlowestTurnIsNone) {
 // A body that comes to rest in a simulation: its velocity falls through the smallest numbers, whose norm is
 // 0.
 TEST(RemoteContacts, SurfacesThatComeToRestStayFelt) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact c = floorAt(0);
   c.damping_Ns_per_m = 1;
   c.yields = true;
@@ -896,7 +437,7 @@ TEST(RemoteContacts, SurfacesThatComeToRestStayFelt) {
 }
 
 TEST(RemoteContacts, DamperTakesEnergyAndNeverPulls) {
-  Rig rig;
+  RemoteRig rig;
   RemoteContact c = floorAt(0);
   c.damping_Ns_per_m = 2;
   rig.approach({c}, {0, 0.001, 0}, {0, -0.002, 0});
@@ -913,7 +454,7 @@ TEST(RemoteContacts, DamperTakesEnergyAndNeverPulls) {
 TEST(RemoteContacts, UnstatedMotionIsPaidFromTheTank) {
   double worked[2] = {};
   for (const bool yields : {false, true}) {
-    Rig rig;
+    RemoteRig rig;
     RemoteContact c = floorAt(0);
     c.yields = yields;
     rig.approach({c}, {0, 0.001, 0}, {0, -0.001, 0});
@@ -940,7 +481,7 @@ TEST(RemoteContacts, UnstatedMotionIsPaidFromTheTank) {
 TEST(RemoteContacts, AStifferSpringIsPaidFromTheTank) {
   double worked_J[2] = {};
   for (const bool yields : {false, true}) {
-    Rig rig;
+    RemoteRig rig;
     RemoteContact soft = floorAt(0, 200);
     soft.yields = yields;
     RemoteContact stiff = floorAt(0, 1000);
@@ -962,87 +503,6 @@ TEST(RemoteContacts, AStifferSpringIsPaidFromTheTank) {
   EXPECT_GT(worked_J[1], 0.1);
   EXPECT_LT(worked_J[0], 0.020 + 2.1 * 0.020 + 0.005)
       << "the start, the refill, and what the spring had stored";
-}
-
-struct Holding {
-  HeldForceLaw law;
-  HeldForce wanted;
-  RemoteRendering out;
-  Vec3 hip = Vec3::Zero();
-  Vec3 velocity = Vec3::Zero();
-  Nanos now = 1000 * kMs;
-  double gain = 1;
-
-  void hold(const Vec3& force_N, Nanos lifetime = 100 * kMs) {
-    ++wanted.number;
-    wanted.received = now;
-    wanted.lifetime = lifetime;
-    wanted.force_N = force_N;
-  }
-  Vec3 step() {
-    now += kMs;
-    hip += 1e-3 * velocity;
-    out = {};
-    law.step(wanted, hip, velocity, now, 1e-3, gain, out);
-    return out.heldForce_N;
-  }
-};
-
-TEST(HeldForce, RisesAtTheRateAndIsZeroAtTheEndOfItsLife) {
-  Holding h;
-  h.hold({0, 3, 0});
-  Vec3 last = Vec3::Zero();
-  double largest = 0;
-  for (int ms = 1; ms <= 100; ++ms) {
-    const Vec3 force = h.step();
-    EXPECT_LE((force - last).norm(), kRate_N_per_ms + kExact_N);
-    largest = std::max(largest, force.y());
-    last = force;
-  }
-  EXPECT_DOUBLE_EQ(largest, 3);
-  EXPECT_NEAR(last.y(), 0, 1e-6);
-  EXPECT_EQ(h.step().y(), 0);
-}
-
-TEST(HeldForce, TankLimitsTheWorkAndTheBrakingPartStays) {
-  Holding h;
-  h.velocity = {0, 0.2, 0};
-  double work = 0;
-  int cutAt = -1;
-  int zeroAt = -1;
-  for (int ms = 0; ms < 2000; ++ms) {
-    if (ms % 20 == 0) h.hold({1, 2, 0});
-    const Vec3 before = h.out.heldForce_N;
-    const Vec3 force = h.step();
-    work += before.y() * 0.2e-3;
-    if (cutAt < 0 && (h.out.status & kRemoteEnergySpent) != 0) cutAt = ms;
-    if (cutAt >= 0 && zeroAt < 0 && std::abs(force.y()) < 1e-9) zeroAt = ms;
-    if (zeroAt == ms) {
-      EXPECT_NEAR(force.x(), 1, 1e-9) << "across the motion nothing is cut";
-    }
-    if (ms == 100) {
-      EXPECT_NE(h.out.status & kRemoteEnergySpent, 0U);
-    }
-  }
-  ASSERT_GE(cutAt, 0);
-  ASSERT_GE(zeroAt, 0);
-  EXPECT_LE(zeroAt - cutAt, 10);
-  EXPECT_LT(work, 0.020 + 2 * 0.020 + 0.005)
-      << "the start, the refill of two seconds, and what one cut takes";
-}
-
-TEST(HeldForce, WhatTheHandReturnsRefillsTheTank) {
-  for (const double gain : {1.0, 0.0}) {
-    Holding h;
-    h.gain = gain;
-    h.wanted.budget.refill_W = 0;
-    h.velocity = {0, -0.2, 0};
-    for (int ms = 0; ms < 200; ++ms) {
-      if (ms % 20 == 0) h.hold({0, 2, 0});
-      h.step();
-    }
-    EXPECT_NEAR(h.out.energy_J, gain > 0 ? 0.050 : 0.020, 1e-9) << "gain " << gain;
-  }
 }
 
 }  // namespace

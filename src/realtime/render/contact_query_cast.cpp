@@ -1,0 +1,268 @@
+// Casts of the tool against the gathered facets, or in steps where they do not reach.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <tuple>
+#include <utility>
+
+#include "realtime/render/contact_query.h"
+
+namespace hapticd::realtime {
+namespace {
+
+constexpr double kSmallestWay_m = 1e-6;
+
+}  // namespace
+
+// Of a path that is examined up to its begin.
+bool ContactQuery::endUnexamined(const Path& path, ObjectHit& hit) noexcept {
+  hit = ObjectHit{};
+  hit.stop = path.begin;
+  hit.unexamined = true;
+  return true;
+}
+
+bool ContactQuery::castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept {
+  ++facetCasts_;
+  if (!pointTool_) return castBall(f, faces(), path.p, path.d, 1, latest, hit);
+  Facet touched = f;
+  touched.radius = radiusAt(f);
+  return castBall(touched, faces(), path.p, path.d, 1, latest, hit);
+}
+
+const Facet* ContactQuery::gatheredFacet(int object, std::uint32_t triangle) const noexcept {
+  if (keepsFacets_) {
+    const Facet* const found = std::find_if(cache_.begin(), cache_.end(), [&](const Facet& f) {
+      return f.object == object && f.triangle == triangle;
+    });
+    return found != cache_.end() ? found : nullptr;
+  }
+  for (int i = 0; i < cache_.size(); ++i) {
+    const FacetCache::TriangleId& id = cache_.triangle(i);
+    if (id.object == object && id.triangle == triangle) return facetOf(id);
+  }
+  return nullptr;
+}
+
+bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, ObjectHit& hit) const noexcept {
+  const Vec3 d = g - p;
+  const bool found = castTool(f, {p, d, 0, 1}, 1, hit);
+  hit.object = f.object;
+  hit.triangle = f.triangle;
+  return found;
+}
+
+// A total order on hits, so that the first one does not depend on the order of visits.
+void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
+                                 bool& found) const noexcept {
+  ObjectHit hit;
+  const double latest = found ? best.stop : path.end;
+  if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
+  hit.object = f.object;
+  hit.triangle = f.triangle;
+  const auto rank = [this](const ObjectHit& h) {
+    return std::tuple(h.stop, -h.depth, h.object < 0 ? h.object : object(h.object).state->id, h.triangle);
+  };
+  if (found && !(rank(hit) < rank(best))) return;
+  best = hit;
+  found = true;
+}
+
+bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noexcept {
+  return keepsFacets_ ? castAtFacets(path, only, hit) : castAtTriangles(path, only, hit);
+}
+
+bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
+  const Vec3 start = path.p + path.begin * path.d;
+  cache_.moveTo(start);
+  bool found = false;
+  if (only < 0 && planes_ != nullptr) {
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
+  }
+  const auto consider = [&](const Facet& f) {
+    if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
+  };
+  const auto latest = [&] { return found ? hit.stop : path.end; };
+  // The facet that blocked the last cast often blocks this one: then few others are near the path before it.
+  const int first = lastBlocker_;
+  if (first < cache_.size()) consider(cache_.begin()[first]);
+  std::array<std::uint16_t, FacetCache::kMaxFacets> candidates;
+  const int count = cache_.facetsNearPath(start, (latest() - path.begin) * path.d, candidates.data());
+  const double length = path.d.norm();
+  for (int k = 0; k < count; ++k) {
+    const int i = candidates[static_cast<std::size_t>(k)];
+    if (i == first) continue;
+    if (workSpent()) return endUnexamined(path, hit);
+    const Facet& f = cache_.begin()[i];
+    const double before = latest();
+    if (!cache_.isWithin(f.radius + 2 * f.skin + (before - path.begin) * length, i)) continue;
+    consider(f);
+    if (found && hit.stop < before) lastBlocker_ = i;
+  }
+  return found;
+}
+
+double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) noexcept {
+  std::array<std::uint16_t, FacetCache::kMaxFacets> candidates;
+  const Vec3 d = g - p;
+  // Another gather would cost more than a path that examines too many.
+  if (!cache_.covers(p, d.norm()) && !ensureGathered(p, d.norm())) return 0;
+  const int count = cache_.facetsNearPath(p, d, candidates.data());
+  double free = 1;
+  const auto meet = [&](Facet facet) {
+    double stop = 1;
+    if (closesGaps && castPoint(facet, faces(), p, d, facet.radius, stop)) free = std::min(free, stop);
+    facet.radius = 0;
+    CastHit hit;
+    if (castBall(facet, faces(), p, d, 1, free, hit)) free = std::min(free, hit.stop);
+  };
+  facetCasts_ += count;
+  for (int i = 0; i < count; ++i) meet(cache_.begin()[candidates[static_cast<std::size_t>(i)]]);
+  if (planes_ == nullptr) return free;
+  for (const PlacedPlane& plane : *planes_) meet(plane.facet);
+  return free;
+}
+
+bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept {
+  cache_.moveTo(path.p + path.begin * path.d);
+  ++cast_;
+  bool found = false;
+  if (only < 0 && planes_ != nullptr) {
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
+  }
+  const double touching = radius_ + 2 * cache_.maxSkin();
+  const auto considerNear = [&](const Vec3& way) {
+    if (workSpent()) return false;
+    const auto near = cache_.trianglesNear(way, touching, discs());
+    countScans();
+    for (const int i : near) {
+      if (workSpent()) return false;
+      considerGathered(i, path, only, hit, found);
+    }
+    return true;
+  };
+  const auto way = [&] { return Vec3(((found ? hit.stop : path.end) - path.begin) * path.d); };
+  // What blocked the last path, or is nearly touched, often blocks this one at once: then farther ones need
+  // no exact test.
+  constexpr double kAtOnce = 0.01;  // of the radius
+  if (lastBlocker_ < cache_.size()) considerGathered(lastBlocker_, path, only, hit, found);
+  if (way().norm() > kAtOnce * radius_ && !considerNear(Vec3::Zero())) return endUnexamined(path, hit);
+  if (!considerNear(way())) return endUnexamined(path, hit);
+  return found;
+}
+
+void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit& best,
+                                    bool& found) noexcept {
+  if (std::exchange(considered_[static_cast<std::size_t>(i)], cast_) == cast_) return;
+  const FacetCache::TriangleId& id = cache_.triangle(i);
+  if (only >= 0 && id.object != only) return;
+  const double touching = radius_ + 2 * cache_.maxSkin();
+  const double latest = found ? best.stop : path.end;
+  const Vec3 ahead = (latest - path.begin) * path.d;
+  if (cache_.lowerBound(i, ahead) > touching) return;
+  const Facet* const f = facetOf(id);
+  if (f == nullptr) return cache_.exclude(i);
+  if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) {
+    work_ += kBoxVisit;
+    return;
+  }
+  considerFacet(*f, path, best, found);
+  if (found && best.stop < latest) lastBlocker_ = i;
+}
+
+// Where more triangles meet than can be gathered: examines them one after the other.
+bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexcept {
+  bool found = false;
+  if (only < 0 && planes_ != nullptr) {
+    for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
+  }
+  const Vec3 middle = path.p + 0.5 * (path.begin + path.end) * path.d;
+  const double reach = 0.5 * (path.end - path.begin) * path.d.norm();
+  for (int i = 0; i < objectCount_; ++i) {
+    if ((only >= 0 && i != only) || isPassable(i)) continue;
+    const PlacedObject& placed = object(i);
+    const double reach_m = reach + placed.radius + 4 * placed.skin;
+    const Vec3 inObject = placed.T_object_device * middle;
+    placed.state->mesh->index.visitNear(
+        inObject, reach_m * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept -> bool {
+          if (workSpent()) return false;
+          if (!mayReach(placed, triangle, inObject, reach_m)) return true;
+          const FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
+          if (!keepsFacets_ && !ballAround(id).isWithin(reach_m, middle)) {
+            work_ += kBoxVisit;
+            return true;
+          }
+          const Facet* const f = facetOf(id);
+          if (f == nullptr) {
+            work_ += kVisit;
+          } else {
+            considerFacet(*f, path, hit, found);
+          }
+          return true;
+        });
+  }
+  return workSpent() ? endUnexamined(path, hit) : found;
+}
+
+// The index has no query for a swept ball: gathers along the path from `begin` to `end`, in steps that grow
+// while the path is free and shrink when the storage overflows.
+bool ContactQuery::castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only,
+                               ObjectHit& hit) noexcept {
+  const double length = d.norm();
+  const double smallestStep = std::min(1.0 / 64, 2 * (gathersBalls() ? fits_m_ : kSmallestWay_m) / length);
+  double step = keepsFacets_ ? 1.0 : std::min(1.0, std::max(0.125 * radius_ / length, smallestStep));
+  while (begin < end) {
+    const bool byWay = !gathersBalls();
+    const double longest_m =
+        byWay ? longestStep_m_ : std::min({longestStep_m_, 2 * roomyReach_m_, 2 * fits_m_});
+    step = std::min({step, end - begin, std::max(longest_m / length, smallestStep)});
+    const bool fits =
+        byWay ? ensureWayGathered(p + begin * d, step * d,
+                                  kAside * step * length + std::min(kSmallestGather_m, longestStep_m_))
+              : ensureGathered(p + (begin + 0.5 * step) * d, 0.5 * step * length * kWiden);
+    if (!fits && step > smallestStep && !workSpent()) {
+      step *= 0.25;
+      longestStep_m_ = step * length;
+      continue;
+    }
+    const Path path{p, d, begin, begin + step};
+    if (fits ? castGathered(path, only, hit) : castAtEach(path, only, hit)) return true;
+    begin += step;
+    step *= 2;
+  }
+  return false;
+}
+
+bool ContactQuery::castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  const Vec3 d = g - p;
+  double free = 0;
+  if (cache_.covers(p, 0)) {
+    free = std::min(share, cache_.exitOf(p, d));
+    if (castGathered({p, d, 0, free}, -1, hit)) return true;
+    if (free == share) return false;
+  }
+  return castInSteps(p, d, free, share, -1, hit);
+}
+
+bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  // What it passes may have more triangles on its way than there is room for.
+  cache_.invalidate();
+  passable_ = passable;
+  const bool found = cast(p, g, hit);
+  passable_ = 0;
+  cache_.invalidate();
+  return found;
+}
+
+bool ContactQuery::castWithinGathered(const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  if (!isGathered(p)) return cast(p, g, hit);
+  const Vec3 d = g - p;
+  return castGathered({p, d, 0, cache_.exitOf(p, d)}, -1, hit);
+}
+
+bool ContactQuery::castAtObject(int object, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
+  return castInSteps(p, g - p, 0, 1, object, hit);
+}
+
+}  // namespace hapticd::realtime
