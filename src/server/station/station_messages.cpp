@@ -155,7 +155,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
-  request.session.send(request.name, capabilities(config, profile, control.canBeHeld() && !replayed));
+  request.session.send(request.name, capabilities(config, profile, !replayed, control.canBeHeld()));
   outbox.extend(request.session);
 }
 
