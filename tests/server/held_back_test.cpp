@@ -204,6 +204,40 @@ TEST_F(HeldBackTest, ARearmThatIsReadAfterItsClientLeftIsRefusedAloud) {
   EXPECT_TRUE(stopped());
 }
 
+// The server ends it itself: what the session held back is not read any more, but the re-arm in it is
+// reported.
+TEST_F(HeldBackTest, ARearmThatIsHeldBackWhenTheServerEndsItsClientIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  flood(*client, 11 * kMiB);  // the queue takes 8 MiB, the session holds the rest
+  client->send(wire::RearmForces{});
+  client->sendPayload(wire::kindOf<wire::Heartbeat>, {});  // overtakes, and is malformed
+  EXPECT_TRUE(watcher_->until(
+      [&] {
+        client->poll();
+        return lines_.count("does not re-arm 'Phantom'") == 1;
+      },
+      60s));
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  openScene();
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
+TEST_F(HeldBackTest, ARearmThatArrivesWhileTheServerEndsItsClientIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  client->endpoint().sendRaw({1, 2}, client->device(), wire::localType(wire::kindOf<wire::Heartbeat>), {},
+                             wire::Reliability::kReliable);
+  client->send(wire::RearmForces{});
+  EXPECT_TRUE(watcher_->untilText("does not re-arm"));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
 // Where nothing is stopped or latched, nothing is lost.
 TEST_F(HeldBackTest, ARearmOfAClientThatLeftIsNoNewsWhereNothingIsStopped) {
   auto client = peer();

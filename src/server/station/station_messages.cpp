@@ -198,9 +198,13 @@ void Station::Impl::on(const Request& request, const wire::RearmForces&) {
 std::optional<wire::Text> Station::Impl::dropRearms(Session& session) {
   const std::size_t dropped =
       std::erase_if(pendingRearms, [&](const auto& entry) { return entry.second == &session; });
-  if (dropped == 0 || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
+  const std::set<wire::LocalSender>& unread = session.lostRearms();
+  const bool any = dropped != 0 || std::any_of(names.begin(), names.end(), [&](const DeviceName& name) {
+                     return unread.count(name.sender) != 0;
+                   });
+  if (!any || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
   const std::string client = fmt::format("client {} ({})", session.id(), session.description());
-  constexpr std::string_view kWhy = "it disconnected before its scene commands were in place";
+  constexpr std::string_view kWhy = "its connection ended before its scene commands were in place";
   session.logWarning(
       fmt::format("({}) does not re-arm '{}': {}", session.description(), config.names.front(), kWhy));
   return wire::Text{.severity = wire::kTextWarning,
