@@ -223,7 +223,7 @@ class SceneBuilder::State {
   }
   void apply(SetHapticScale& c, const Call& call) {
     if (!(c.scale > 1e-9 && c.scale < 1e9)) {
-      call.refuse("setHapticScale", "refused: not a positive number", " ", c.scale);
+      call.refuse("setHapticScale", "refused: use a positive number between 1e-9 and 1e9", " ", c.scale);
       return;
     }
     asked_.keep(c);

@@ -34,10 +34,10 @@ inline constexpr EffectKind kEffectKinds[] = {
     {"contactVibration", EffectType::contactVibration, false, true, true, false, false},
 };
 
-/// Of the effects that do not ramp out, and of those that ramp out while nothing has their index.
+/// Of the effects that do not ramp out. A reset lets all of them ramp out at once.
 inline constexpr std::size_t kMaxEffects = 64;
-/// Of those that ramp out after another one took their index.
-inline constexpr std::size_t kMostReplacedForces = 8;
+/// Of those that still ramp out then, after an earlier one.
+inline constexpr std::size_t kMostOfEarlierReset = 8;
 
 /// A running effect. The servo starts its clock and phase when it first sees a new `start` number.
 struct Effect {

@@ -10,6 +10,10 @@
 
 namespace hapticd::scene {
 
+/// Of the fields that ramp out after another one took their place, of sendForceField and of constraints
+/// together.
+inline constexpr std::size_t kMostReplacedFields = 8;
+
 /// F = force + jacobian (x - origin), which fades to zero over the rim inside the radius, so that its edge is
 /// no step. World frame and units, newtons.
 struct ForceField {

@@ -81,10 +81,9 @@ Effect effectFrom(const EffectKind& kind, const DefineEffect& c, const SceneConf
 }
 
 // The oldest goes first: the servo follows 16 fields that ramp out.
-template <class Force>
-void addLeaving(OwnedForce<Force>&& force, std::vector<OwnedForce<Force>>& leaving) {
-  if (leaving.size() == kMostReplacedForces) leaving.erase(leaving.begin());
-  leaving.push_back(std::move(force));
+void addLeaving(OwnedForce<ForceField>&& field, std::vector<OwnedForce<ForceField>>& leaving) {
+  if (leaving.size() == kMostReplacedFields) leaving.erase(leaving.begin());
+  leaving.push_back(std::move(field));
 }
 
 }  // namespace
@@ -127,7 +126,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   if (known != effects_.end() && known->second.value.effect.releasing) {
-    addLeaving({known->second.owner, known->second.value.effect, known->second.goneAt}, leavingEffects_);
+    leavingEffects_.push_back({known->second.owner, known->second.value.effect, known->second.goneAt});
     effects_.erase(known);
   }
   Owned<RunningEffect>& entry = effects_[c.index];

@@ -208,15 +208,24 @@ std::size_t FreeForces::countEffects(bool releasing) const {
   }));
 }
 
-// Of clients that reset and start all anew, again and again within 300 ms. The oldest go first.
+// Of clients that reset and start all anew, again and again within 300 ms. The oldest go first, and those
+// whose index has been taken before those that still have it at the same time.
 void FreeForces::boundReleasingEffects() {
-  for (std::size_t count = countEffects(true); count > kMostReleasing; --count) {
+  for (std::size_t count = countEffects(true) + leavingEffects_.size(); count > kMostReleasing; --count) {
+    const auto older = [](const auto& a, const auto& b) { return a.goneAt < b.goneAt; };
+    const auto replaced = std::min_element(leavingEffects_.begin(), leavingEffects_.end(), older);
     auto oldest = effects_.end();
     for (auto it = effects_.begin(); it != effects_.end(); ++it) {
       if (!it->second.value.effect.releasing) continue;
-      if (oldest == effects_.end() || it->second.goneAt < oldest->second.goneAt) oldest = it;
+      if (oldest == effects_.end() || older(it->second, oldest->second)) oldest = it;
     }
-    effects_.erase(oldest);
+    const bool isReplaced = replaced != leavingEffects_.end() &&
+                            (oldest == effects_.end() || replaced->goneAt <= oldest->second.goneAt);
+    if (isReplaced) {
+      leavingEffects_.erase(replaced);
+    } else {
+      effects_.erase(oldest);
+    }
   }
 }
 

@@ -109,8 +109,8 @@ class FreeForces {
   using Constraint = ForceConstraint;
   static constexpr double kWorldUnitsPerStockMetre = 1000;
   static constexpr Nanos kNever = std::numeric_limits<Nanos>::max();
-  static constexpr Nanos kRelease = 300'000'000;              ///< ramping out takes 250 ms in the servo
-  static constexpr std::size_t kMostReleasing = kMaxEffects;  ///< beside as many that do not ramp out
+  static constexpr Nanos kRelease = 300'000'000;  ///< ramping out takes 250 ms in the servo
+  static constexpr std::size_t kMostReleasing = kMaxEffects + kMostOfEarlierReset;  ///< effects
   static constexpr Nanos kAfterEnd = 50'000'000;     ///< the servo ends a timed force by its own clock
   static constexpr Nanos kRemember = 1'000'000'000;  ///< a start whose definition has not arrived yet
 

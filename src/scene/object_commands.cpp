@@ -311,8 +311,8 @@ void ObjectTable::handle(SetObjectScale& c, const Call& call) {
   Affine t = object->T_parent_object;
   t.linear() = object->rotation.toRotationMatrix() * c.scale.asDiagonal();
   if (!isInvertible(t)) {
-    call.refuse(kName, "refused: a scale is zero or not finite", " object ", c.object, ", scale ",
-                c.scale.transpose());
+    call.refuse(kName, "refused: a scale is zero, not finite, too large, or too small beside the others",
+                " object ", c.object, ", scale ", c.scale.transpose());
     return;
   }
   becomeStock(*object);

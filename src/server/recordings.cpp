@@ -82,9 +82,18 @@ std::unique_ptr<record::Recorder> Recordings::createFile(const std::filesystem::
       [this](record::RecorderProblem problem, const std::string& text) {
         spdlog::log(problem == record::RecorderProblem::losses ? spdlog::level::warn : spdlog::level::err,
                     "{}", text);
-        post_([this, problem, text] { options_.onProblem(problem, text); });
+        post_([this, problem, text] { onProblem(problem, text); });
       },
       options);
+}
+
+// A disk that fails as soon as a file has begun may be heard of before its beginning.
+void Recordings::onProblem(record::RecorderProblem problem, const std::string& text) const {
+  if (beginning_) {
+    beginning_->problems.emplace_back(problem, text);
+  } else {
+    options_.onProblem(problem, text);
+  }
 }
 
 // Several may begin in one second.
@@ -227,7 +236,8 @@ void Recordings::begun() {
     beganBy_ = std::move(beginning->listener);
     attach();
   }
-  beginning->begun(beginning->refusal);
+  beginning->begun(beginning->refusal, recorder_ ? recorder_->path().string() : "");
+  for (const auto& [problem, text] : beginning->problems) options_.onProblem(problem, text);
   if (!beginning->ended) return;
   if (!recorder_) return beginning->ended->tell("nothing is recorded");
   endPresent(std::move(beginning->ended));

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/thread.h"
@@ -38,8 +39,9 @@ class Recordings {
   /// Before the scenes start. Records to the file that was created, if there is one. The recording of a scene
   /// that runs begins with the commands that make it, and its ticks follow.
   void begin(base::Nanos wallOffset, std::string config);
-  /// Gets a text for the client: why the recording was refused, or nothing when it records to file().
-  using Begun = std::function<void(const std::string& refusal)>;
+  /// Gets a text for the client: why the recording was refused, or nothing, and the file to which it records.
+  /// What goes wrong with it is told later, also when it happened sooner.
+  using Begun = std::function<void(const std::string& refusal, const std::string& file)>;
   /// The client that gets a text once the file is complete.
   struct Listener {
     scene::ClientId client = 0;
@@ -86,6 +88,7 @@ class Recordings {
     Begun begun;
     Listener listener;
     std::optional<Listener> ended;  // a client that asked meanwhile that it ends
+    std::vector<std::pair<record::RecorderProblem, std::string>> problems;  // meanwhile
     std::unique_ptr<record::Recorder> recorder;
     std::string refusal;
   };
@@ -93,6 +96,7 @@ class Recordings {
   std::unique_ptr<record::Recorder> createFile(const std::filesystem::path& path) const;
   std::unique_ptr<record::Recorder> createNumberedFile(const std::filesystem::path& path) const;
   std::vector<record::RecordedDevice> devices() const;
+  void onProblem(record::RecorderProblem problem, const std::string& text) const;
   void beginIn(Beginning& beginning) const noexcept;
   void begun();
   void endPresent(std::optional<Listener> listener);

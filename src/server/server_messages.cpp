@@ -153,10 +153,10 @@ void Server::onRecordingControl(Session& session, const wire::MessageReceived& m
     if (wanted->record == 0) return recordings_.end(name, std::move(listener));
     recordings_.start(
         name, clock_.offset(), toToml(config_),
-        [this, answer, id = session.id()](const std::string& refusal) {
+        [answer, id = session.id()](const std::string& refusal, const std::string& file) {
           if (!refusal.empty()) return answer(wire::kTextError, "Recording_Control " + refusal);
           spdlog::info("client {} began it", id);
-          answer(wire::kTextNormal, "recording to " + recordings_.file());
+          answer(wire::kTextNormal, "recording to " + file);
         },
         std::move(listener));
   } catch (const record::RecordingError& error) {

@@ -80,12 +80,17 @@ TEST_F(Replay, ClientsReceiveTheRecordedTicks) {
   EXPECT_GT(touching, 50U);
 }
 
-TEST_F(Replay, OffersNoHandToHold) {
+// Batches and meshes are offered: a client that sends them is told by the server why it refuses them, which
+// its own library cannot know.
+TEST_F(Replay, OffersNoHandAndNoStreamsOfContacts) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::QueryCapabilities{});
   ASSERT_TRUE(peer.untilNext<wire::Capabilities>());
-  EXPECT_EQ(peer.last<wire::Capabilities>()->features & wire::kFeatureHoldHand, 0U);
+  const std::uint32_t features = peer.last<wire::Capabilities>()->features;
+  EXPECT_EQ(features & (wire::kFeatureHoldHand | wire::kFeatureRemoteContacts), 0U);
+  EXPECT_NE(features & wire::kFeatureSubscribe, 0U);
+  EXPECT_NE(features & wire::kFeatureStop, 0U) << "its refusal says why";
 }
 
 TEST(ReplayConfig, NeedsNothingOfTheMachineThatRecorded) {

@@ -204,6 +204,40 @@ TEST_F(HeldBackTest, ARearmThatIsReadAfterItsClientLeftIsRefusedAloud) {
   EXPECT_TRUE(stopped());
 }
 
+// The server ends it itself: what the session held back is not read any more, but the re-arm in it is
+// reported.
+TEST_F(HeldBackTest, ARearmThatIsHeldBackWhenTheServerEndsItsClientIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  closeScene();
+  flood(*client, 11 * kMiB);  // the queue takes 8 MiB, the session holds the rest
+  client->send(wire::RearmForces{});
+  client->sendPayload(wire::kindOf<wire::Heartbeat>, {});  // overtakes, and is malformed
+  EXPECT_TRUE(watcher_->until(
+      [&] {
+        client->poll();
+        return lines_.count("does not re-arm 'Phantom'") == 1;
+      },
+      60s));
+  EXPECT_TRUE(watcher_->untilText("before its scene commands were in place"));
+  openScene();
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
+TEST_F(HeldBackTest, ARearmThatArrivesWhileTheServerEndsItsClientIsRefusedAloud) {
+  auto client = peer();
+  client->send(wire::StopForces{});
+  ASSERT_TRUE(untilStopped());
+  client->endpoint().sendRaw({1, 2}, client->device(), wire::localType(wire::kindOf<wire::Heartbeat>), {},
+                             wire::Reliability::kReliable);
+  client->send(wire::RearmForces{});
+  EXPECT_TRUE(watcher_->untilText("does not re-arm"));
+  ASSERT_TRUE(untilTicks(*watcher_, 100));
+  EXPECT_TRUE(stopped());
+}
+
 // Where nothing is stopped or latched, nothing is lost.
 TEST_F(HeldBackTest, ARearmOfAClientThatLeftIsNoNewsWhereNothingIsStopped) {
   auto client = peer();
@@ -261,6 +295,43 @@ TEST_F(HeldBackTest, TheHandIsHeldWhereTheClientsWorkspaceHasIt) {
   commandAndHold(wire::ResetScene{}, -15);
   watcher_->forget();
   EXPECT_TRUE(untilAt(-0.015));
+}
+
+// A query answers of the world as the client has commanded it before, and not of the last tick.
+TEST_F(HeldBackTest, TheWorkspaceIsToldAsTheClientsCommandsHaveIt) {
+  const auto client = peer();
+  client->send(wire::TrackerRequestWorkspace{});
+  ASSERT_TRUE(client->untilNext<wire::TrackerWorkspace>());
+  const double before = client->last<wire::TrackerWorkspace>()->max[0];
+  closeScene();
+  client->queue(wire::SetHapticScale{.scale = 2});
+  client->queue(wire::TrackerRequestWorkspace{});
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  openScene();
+  ASSERT_TRUE(client->until([&] { return client->count<wire::TrackerWorkspace>() == 2; }));
+  EXPECT_NEAR(client->last<wire::TrackerWorkspace>()->max[0], 2 * before, 1e-9);
+}
+
+// A reset takes the origin away; one that the client sets after it stays.
+TEST_F(HeldBackTest, TheOriginIsSetInTheWorldOfTheClientsCommands) {
+  const auto client = peer();
+  watcher_->send(wire::Subscribe{.kinds = wire::kReportTracker, .rate = 0});
+  watcher_->send(wire::HoldHand{.hold = 1, .position = {20, 0, 0}});
+  ASSERT_TRUE(watcher_->until([&] {
+    const auto pose = watcher_->last<wire::TrackerPosQuat>();
+    return pose && std::abs(pose->position[0] - 0.020) < 1e-4;
+  }));
+  closeScene();
+  client->queue(wire::ResetScene{});
+  client->queue(wire::SetHapticScale{.scale = 2});
+  client->queue(wire::TrackerResetOrigin{});
+  client->queue(wire::TrackerRequestToRoom{});
+  client->send(wire::Ping{});
+  ASSERT_TRUE(client->untilNext<wire::Pong>());
+  openScene();
+  ASSERT_TRUE(client->until([&] { return client->count<wire::TrackerToRoom>() == 1; }));
+  EXPECT_NEAR(client->last<wire::TrackerToRoom>()->position[0], 0.040, 1e-3);
 }
 
 // The newest order counts, although an older one still waits for the scene.

@@ -28,8 +28,8 @@ class RecordingsTest : public testing::Test {
   void start(const std::string& name) {
     recordings.start(
         name, 0, "",
-        [this](const std::string& refusal) {
-          begun.push_back(refusal.empty() ? "recording to " + recordings.file() : refusal);
+        [this](const std::string& refusal, const std::string& file) {
+          begun.push_back(refusal.empty() ? "recording to " + file : refusal);
         },
         client(1));
   }
@@ -64,6 +64,7 @@ class RecordingsTest : public testing::Test {
   Recordings recordings{
       scenes, stations, post(), {.folder = "/", .onProblem = [this](auto, const std::string& text) {
                                    problems.push_back(text);
+                                   begun.push_back("problem: " + text);
                                  }}};
 };
 
@@ -122,6 +123,21 @@ TEST_F(RecordingsTest, AFileThatTakesNoHeaderIsRefusedOnce) {
   start("a.haptics");
   run();
   EXPECT_EQ(begun, std::vector<std::string>{"recording to /a.haptics"});
+}
+
+// Before the net thread hears that it has begun. It learns of both in this order, and of the file.
+TEST_F(RecordingsTest, OneThatFailsAsSoonAsItHasBegunIsNamed) {
+  start("a.haptics");
+  world.threads.runUntil(world.clock.now() + 1);
+  ASSERT_TRUE(world.files.exists("/a.haptics"));
+  world.files.remove("/a.haptics");
+  world.threads.runUntil(world.clock.now() + 2'000'000'000);
+  EXPECT_TRUE(begun.empty());
+  run();
+  ASSERT_EQ(begun.size(), 2U);
+  EXPECT_EQ(begun[0], "recording to /a.haptics");
+  EXPECT_TRUE(begun[1].starts_with("problem: ")) << begun[1];
+  EXPECT_EQ(recordings.file(), "");
 }
 
 // Two operators: the first one's end must not be that of the second one's recording.

@@ -26,12 +26,20 @@ function programKey(): number {
   if (keyOfPage !== 0) return keyOfPage;
   const stored = Number(sessionStorage.getItem(PROGRAM_KEY));
   keyOfPage = Number.isSafeInteger(stored) && stored > 0 ? stored : randomKey();
+  sessionStorage.removeItem(PROGRAM_KEY);
+  window.addEventListener("pagehide", storeKey);
+  window.addEventListener("pageshow", () => sessionStorage.removeItem(PROGRAM_KEY));
+  return keyOfPage;
+}
+
+/** Only from one page of the tab to the next: a browser that duplicates a tab copies what the tab stores, and a copy beside this page
+ * is another program. */
+function storeKey(): void {
   try {
     sessionStorage.setItem(PROGRAM_KEY, String(keyOfPage));
   } catch {
-    // The browser stores nothing: it is kept until the page is loaded again.
+    // The browser stores nothing: the next page of this tab is another program.
   }
-  return keyOfPage;
 }
 
 /** What a new connection sends first. */

@@ -70,7 +70,7 @@ class Effects {
   bool contactVibrationPulls_;
   bool anew_ = false;
   Affine T_world_device_ = Affine::Identity();  // of the last tick
-  std::array<Running, 2 * kMaxEffects + scene::kMostReplacedForces> running_;
+  std::array<Running, 2 * kMaxEffects + scene::kMostOfEarlierReset> running_;
   int count_ = 0;
 };
 

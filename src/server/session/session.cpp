@@ -135,7 +135,7 @@ bool Session::release() {
   flush();
   if (!backlog_.empty() && !ending_) return !held_;
   pauseReading(false);
-  if (closeReason_) owner_.onClosed(*this, *closeReason_);
+  if (closeReason_) closed(*closeReason_);
   return false;
 }
 
@@ -148,11 +148,21 @@ void Session::onDrained() {
 // Messages that the client sent before it disconnected are still handled.
 void Session::onEnd(const std::string& reason) {
   if (!failure_.empty() || backlog_.empty()) {
-    owner_.onClosed(*this, failure_.empty() ? reason : failure_);
+    closed(failure_.empty() ? reason : failure_);
     return;
   }
   closeReason_ = reason;
   peerIsGone(reason);
+}
+
+// What is still held back is not handled.
+void Session::closed(const std::string& reason) {
+  while (!backlog_.empty()) noteLost(backlog_.pop().message);
+  owner_.onClosed(*this, reason);
+}
+
+void Session::noteLost(const wire::MessageReceived& message) {
+  if (message.kind == wire::kindOf<wire::RearmForces>) lostRearms_.insert(message.local_sender);
 }
 
 void Session::peerIsGone(const std::string& reason) {
@@ -291,7 +301,10 @@ void Session::onEvent(const wire::Event& event) {
 void Session::onReceived(const wire::MessageReceived& message) {
   // VRPN ignores messages of senders and types that the receiver does not know.
   if (message.local_sender.value < 0 || message.kind == wire::kUnknownKind) return;
-  if (ending_ && message.kind != wire::kindOf<wire::StopForces>) return;
+  if (ending_ && message.kind != wire::kindOf<wire::StopForces>) {
+    if (!inDatagram_) noteLost(message);
+    return;
+  }
   // Whatever stock clients send by TCP only is forged here.
   const wire::MessageInfo& info = wire::info(message.kind);
   if (inDatagram_ && (info.reliability != wire::Reliability::kLowLatency || info.role != wire::Role::scene))

@@ -146,6 +146,9 @@ class Session {
   bool release();
   /// Whether messages are held back.
   bool holding() const noexcept { return held_ || !backlog_.empty(); }
+  /// The devices whose re-arm the session has not passed on, because the server ended the connection. Whole
+  /// in onClosed().
+  const std::set<wire::LocalSender>& lostRearms() const noexcept { return lostRearms_; }
   /// Checks the client's heartbeats.
   HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
   /// The server itself stood still until `now`: silence counts from here.
@@ -171,6 +174,8 @@ class Session {
   void pauseReading(bool pause);
   void onDrained();
   void onEnd(const std::string& reason);
+  void closed(const std::string& reason);
+  void noteLost(const wire::MessageReceived& message);
   void peerIsGone(const std::string& reason);
   void onSender(std::string_view name);
   void onUdp(const wire::UdpAddress& address);
@@ -216,6 +221,7 @@ class Session {
   bool reading_ = true;
   std::optional<std::string> closeReason_;  // set when the connection closed before the backlog was empty
   MessageBacklog backlog_;
+  std::set<wire::LocalSender> lostRearms_;
   HeartbeatWatch heartbeats_;
   std::array<wire::Time, wire::kMessageKinds>
       lastReliable_{};  // newest reliable message of each kind, client's clock

@@ -29,12 +29,13 @@ wire::TrackerToRoom trackerToRoom(const ReportFrame& frame) {
 }
 
 wire::Capabilities capabilities(const DeviceConfig& config, const device::DeviceProfile& profile,
-                                bool canBeHeld) {
+                                bool takesInput, bool canBeHeld) {
   const Box box = workspaceOf(config, profile);
   return {.version = wire::kExtensionVersion,
           .features = wire::kFeatureBulkMesh | wire::kFeatureBatch | wire::kFeatureSubscribe |
-                      wire::kFeatureStop | wire::kFeatureHeartbeat | wire::kFeatureRemoteContacts |
-                      (canBeHeld ? wire::kFeatureHoldHand : 0U),
+                      wire::kFeatureStop | wire::kFeatureHeartbeat |
+                      (takesInput ? wire::kFeatureRemoteContacts : 0U) |
+                      (takesInput && canBeHeld ? wire::kFeatureHoldHand : 0U),
           .servoRate = config.servoRate_Hz,
           .reportRate = config.reportRate_Hz,
           .peakForce = profile.peakForce_N,

@@ -18,6 +18,6 @@ wire::TrackerToRoom trackerToRoom(const ReportFrame& frame);
 
 /// Extensions, rates, peak force and workspace of the device.
 wire::Capabilities capabilities(const DeviceConfig& config, const device::DeviceProfile& profile,
-                                bool canBeHeld);
+                                bool takesInput, bool canBeHeld);
 
 }  // namespace hapticd::server

@@ -339,6 +339,8 @@ void Station::setKey(scene::ClientId client, std::uint64_t key) {
 }
 
 std::optional<wire::Text> Station::sessionGone(Session& session) {
+  impl_->waiting.erase(impl_->waiting.lower_bound({session.id(), 0}),
+                       impl_->waiting.lower_bound({session.id() + 1, 0}));
   auto text = impl_->dropRearms(session);
   clientGone(session.id());
   return text;

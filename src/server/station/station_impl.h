@@ -1,8 +1,10 @@
 // Members of a station, for station.cpp (lifetime and reports) and station_messages.cpp (control messages).
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "base/world.h"
 #include "device/simulated/steered_hand.h"
@@ -67,6 +69,9 @@ struct Station::Impl {
   void on(const Request&, const wire::ReplayControl&) {}     // the server handles it
   void on(const Request&, const wire::RecordingControl&) {}  // the server handles it
   void on(const Request& request, const wire::ReleaseControl&);
+  /// Calls in the net thread once what the client commanded so far is applied; never after it has gone.
+  void whenApplied(Session& session, std::function<void(Session&)> call);
+  realtime::TickReport lastTickNow();
   std::optional<wire::Text> dropRearms(Session& session);
   void rearm(Session& session, wire::LocalSender name, const DeviceControl::Order& order,
              const DeviceControl::Sender& sender);
@@ -104,6 +109,15 @@ struct Station::Impl {
   // Connections whose re-arm waits for the scene, by the number of the re-arm.
   std::map<std::uint64_t, Session*> pendingRearms;
   std::uint64_t rearms = 0;
+  // What waits until the scene has applied the commands that the same connection sent before, by client and
+  // number.
+  struct Waiting {
+    Session* session = nullptr;
+    std::function<void(Session&)> call;
+  };
+  std::map<std::pair<scene::ClientId, std::uint64_t>, Waiting> waiting;
+  std::uint64_t waits = 0;
+  bool asking = false;  // whether the client's commands are applied: a call now answers what is being read
   // Connections that held the hand or let go of it, and the number of the last such order that was carried
   // out: earlier ones that waited longer for the scene are overtaken.
   struct Holding {

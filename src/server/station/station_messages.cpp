@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <set>
+#include <utility>
 
 #include "server/station/replies.h"
 #include "server/station/station_impl.h"
@@ -93,7 +96,8 @@ void Station::Impl::on(const Request& request, const wire::Text& text) {
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestToRoom&) {
-  request.session.send(request.name, trackerToRoom(frame));
+  whenApplied(request.session,
+              [this, name = request.name](Session& session) { session.send(name, trackerToRoom(frame)); });
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToSensor&) {
@@ -106,7 +110,9 @@ void Station::Impl::on(const Request& request, const wire::TrackerRequestUnitToS
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerRequestWorkspace&) {
-  request.session.send(request.name, trackerWorkspace(workspaceOf(config, profile), outbox.last()));
+  whenApplied(request.session, [this, name = request.name](Session& session) {
+    session.send(name, trackerWorkspace(workspaceOf(config, profile), lastTickNow()));
+  });
 }
 
 void Station::Impl::on(const Request& request, const wire::TrackerSetUpdateRate& wanted) {
@@ -142,11 +148,40 @@ std::optional<double> Station::Impl::chosenRate(const Request& request, double w
   return std::clamp(wanted_Hz, kSlowest_Hz, config.servoRate_Hz);
 }
 
-// The pose of the proxy becomes the origin of the tracker reports.
-void Station::Impl::on(const Request&, const wire::TrackerResetOrigin&) {
-  const ClientTick clientTick = toClientTick(outbox.last(), config.forceReport);
-  frame.origin = clientTick.proxy;
-  frame.rotation = clientTick.orientation;
+// The pose of the proxy becomes the origin of the tracker reports, once the client's earlier commands have
+// placed the world: a reset of the scene among them takes the origin away.
+void Station::Impl::on(const Request& request, const wire::TrackerResetOrigin&) {
+  whenApplied(request.session, [this](Session&) {
+    const ClientTick clientTick = toClientTick(lastTickNow(), config.forceReport);
+    frame.origin = clientTick.proxy;
+    frame.rotation = clientTick.orientation;
+  });
+}
+
+// The client's later orders of this kind may find its commands applied before this one has been called: it
+// then comes first.
+void Station::Impl::whenApplied(Session& session, std::function<void(Session&)> call) {
+  const std::pair last(session.id(), ++waits);
+  waiting.emplace(last, Waiting{&session, std::move(call)});
+  asking = true;
+  scene.whenApplied(session.id(), [this, last] {
+    const auto known = waiting.find(last);
+    if (known == waiting.end()) return;
+    Session& client = *known->second.session;
+    for (auto next = waiting.lower_bound({last.first, 0}); next != waiting.end() && next->first <= last;) {
+      const auto node = waiting.extract(next++);
+      if (!client.ending()) node.mapped().call(client);
+    }
+    if (!asking && !client.ending()) client.flush();  // otherwise at the end of what was read
+  });
+  asking = false;
+}
+
+// The newest scene places the world, which the servo may not have seen yet.
+realtime::TickReport Station::Impl::lastTickNow() {
+  realtime::TickReport last = outbox.last();
+  if (!replayed) last.T_world_device = placement.read().T_world_device;
+  return last;
 }
 
 void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
@@ -155,7 +190,7 @@ void Station::Impl::on(const Request& request, const wire::ButtonAdmin& admin) {
 }
 
 void Station::Impl::on(const Request& request, const wire::QueryCapabilities&) {
-  request.session.send(request.name, capabilities(config, profile, control.canBeHeld() && !replayed));
+  request.session.send(request.name, capabilities(config, profile, !replayed, control.canBeHeld()));
   outbox.extend(request.session);
 }
 
@@ -198,9 +233,13 @@ void Station::Impl::on(const Request& request, const wire::RearmForces&) {
 std::optional<wire::Text> Station::Impl::dropRearms(Session& session) {
   const std::size_t dropped =
       std::erase_if(pendingRearms, [&](const auto& entry) { return entry.second == &session; });
-  if (dropped == 0 || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
+  const std::set<wire::LocalSender>& unread = session.lostRearms();
+  const bool any = dropped != 0 || std::any_of(names.begin(), names.end(), [&](const DeviceName& name) {
+                     return unread.count(name.sender) != 0;
+                   });
+  if (!any || (!tick.control().stopped() && outbox.last().guard.latched == 0)) return std::nullopt;
   const std::string client = fmt::format("client {} ({})", session.id(), session.description());
-  constexpr std::string_view kWhy = "it disconnected before its scene commands were in place";
+  constexpr std::string_view kWhy = "its connection ended before its scene commands were in place";
   session.logWarning(
       fmt::format("({}) does not re-arm '{}': {}", session.description(), config.names.front(), kWhy));
   return wire::Text{.severity = wire::kTextWarning,

@@ -50,7 +50,7 @@ class Socket {
   }
 }
 
-Object.assign(globalThis, { window: globalThis, location: { protocol: "http:", host: "test" }, WebSocket: Socket });
+Object.assign(globalThis, { window: globalThis, addEventListener: () => undefined, location: { protocol: "http:", host: "test" }, WebSocket: Socket });
 const timers = [];
 const { setTimeout: realTimeout, setInterval: realInterval } = globalThis;
 globalThis.setInterval = (...args) => {
@@ -258,7 +258,7 @@ test("a file with a long name leaves no open batch", async () => {
 
 test("a token that cannot be one keeps no page from connecting", () => {
   const stored = new Map();
-  globalThis.sessionStorage = { getItem: (key) => stored.get(key) ?? null };
+  globalThis.sessionStorage = { getItem: (key) => stored.get(key) ?? null, setItem: () => undefined, removeItem: () => undefined };
   stored.set("hapticd token", "ü".repeat(100));
   const link = new Link(() => undefined, () => undefined, credentials);
   link.connect("Arm");
@@ -269,30 +269,56 @@ test("a token that cannot be one keeps no page from connecting", () => {
 });
 
 test("every connection of a page begins with the same key, also after the page was loaded again", async () => {
-  const stored = new Map();
-  globalThis.sessionStorage = {
+  const storage = (stored) => ({
+    stored,
     getItem: (name) => stored.get(name) ?? null,
     setItem: (name, value) => stored.set(name, value),
     removeItem: (name) => stored.delete(name),
-  };
+  });
+  const listeners = new Map();
+  const before = globalThis.addEventListener;
+  globalThis.addEventListener = (name, call) => listeners.set(name, call);
   const keyOf = ({ payload }) => new DataView(payload.buffer, payload.byteOffset + payload.byteLength - 8).getBigUint64(0);
-  const page = await bundled("token.ts");
-  const keyOfNow = () => {
+  const keyIn = (page) => {
     const messages = page.credentials();
     assert.deepEqual(messages.map((m) => m.name), ["hapticd Identify"]);
     return keyOf(messages[0]);
   };
-  const key = keyOfNow();
+  const tab = storage(new Map());
+  globalThis.sessionStorage = tab;
+  const page = await bundled("token.ts");
+  const key = keyIn(page);
   assert.notEqual(key, 0n);
-  assert.equal(keyOfNow(), key);
-  stored.set("hapticd token", "0123456789abcdef");
-  assert.equal(keyOfNow(), key);
+  assert.equal(keyIn(page), key);
+  tab.stored.set("hapticd token", "0123456789abcdef");
+  assert.equal(keyIn(page), key);
+  const leaves = listeners.get("pagehide");
+  const returns = listeners.get("pageshow");
+
+  globalThis.sessionStorage = storage(new Map(tab.stored)); // the browser copies it
+  assert.notEqual(keyIn(await bundled("token.ts")), key, "a tab that was duplicated is another program");
+
+  globalThis.sessionStorage = tab;
+  leaves();
   const again = await bundled("token.ts");
-  assert.equal(keyOf(again.credentials()[0]), key);
-  stored.clear(); // another tab
-  assert.notEqual(keyOf((await bundled("token.ts")).credentials()[0]), key);
-  globalThis.sessionStorage = { getItem: () => null, setItem: () => { throw new Error("full"); } };
-  assert.equal(keyOfNow(), keyOfNow(), "in memory where the browser stores nothing");
+  assert.equal(keyIn(again), key, "loaded again");
+
+  globalThis.sessionStorage = storage(new Map(tab.stored));
+  assert.notEqual(keyIn(await bundled("token.ts")), key, "duplicated after that");
+
+  globalThis.sessionStorage = tab;
+  leaves();
+  returns(); // from the browser's cache of pages
+  assert.equal(keyIn(page), key);
+  globalThis.sessionStorage = storage(new Map(tab.stored));
+  assert.notEqual(keyIn(await bundled("token.ts")), key, "duplicated after its return");
+
+  globalThis.sessionStorage = storage(new Map());
+  assert.notEqual(keyIn(await bundled("token.ts")), key, "another tab");
+  globalThis.sessionStorage = { getItem: () => null, removeItem: () => undefined, setItem: () => { throw new Error("full"); } };
+  assert.equal(keyIn(page), key, "in memory where the browser stores nothing");
+  listeners.get("pagehide")();
+  globalThis.addEventListener = before;
 });
 
 test("only a refusal of the hand makes the page forget the hand it holds", () => {
