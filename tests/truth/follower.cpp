@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "truth/descent.h"
+
 namespace hapticd::truth {
 namespace {
 
@@ -13,6 +15,10 @@ constexpr std::size_t kEnds = 12;  // tried around the proxy, for each widening
 constexpr double kFarthestEnd_m = 500e-6;
 constexpr std::size_t kFollowers = 4;                          // where the place is not known
 constexpr std::array<double, 3> kWidenings_m{30e-6, 5e-6, 0};  // of the faces between ball and proxy
+constexpr double kFarthestBall_m = 60e-6;  // the reported proxy is at most 50 um from the ball that touches
+constexpr double kRolling = 1.01;          // radii: a rolling ball may overlap faces by 2 nm
+constexpr double kBehind =
+    2.5;  // radii: a proxy nearer to the ball may be in front of a face that it is behind
 
 void addOther(const Point& p, std::vector<Point>& places) {
   const auto same = [&](const Point& q) { return (p - q).norm() < 1e-9; };
@@ -68,9 +74,16 @@ class Follower {
     return [&space, &p, widening, onSeveral, this](const Point& q) {
       return std::none_of(space.faces().begin(), space.faces().end(), [&](int i) {
         return reference_.pierces(i, q, p, widening) &&
-               !(onSeveral && reference_.onPlane(reference_.face(i), p));
+               !(onSeveral && reference_.onPlane(reference_.face(i), p)) && !passesFromBehind(i, q, p);
       });
     };
+  }
+
+  // A one-sided face has let the surface of the ball through from behind, and not yet its centre.
+  bool passesFromBehind(int i, const Point& ball, const Point& p) const {
+    const Face& f = reference_.face(i);
+    return trial_.sides != Sides::both && !f.unbounded && (ball - p).norm() <= kBehind * radius_ &&
+           !reference_.touchableFrom(f, f.normal.dot(ball - f.a));
   }
 
   // The followers where the proxy may be anywhere around its reported place.
@@ -118,7 +131,17 @@ class Follower {
     return !arrived.empty() || !decided;
   }
 
+  // First where the ball gets by rolling, if the proxy may be reported from there: other ends are places
+  // around the proxy, which may all be on the wrong side of a face that it is on.
   std::optional<Point> endOf(const Point& ball, const Point& p, bool& decided) {
+    Descent descent(reference_, ball, (p - ball).norm() + 400e-6, kRolling * radius_, ++seed_);
+    const Point rolled = descent.from(ball, p);
+    const FreeSpace space(reference_, p, kFarthestBall_m, radius_, seed_);
+    if ((rolled - p).norm() <= kFarthestBall_m && space.clear(rolled, rolled) &&
+        seesProxy(space, p, 0)(rolled)) {
+      decided = true;
+      return rolled;
+    }
     const auto end = endOf(ball, p, false, decided);
     return end || trial_.sides == Sides::both ? end : endOf(ball, p, true, decided);
   }
@@ -138,9 +161,13 @@ class Follower {
       }
     }
     decided = decided || !ends.empty();
-    FreeSpace space(reference_, middle, 5 * way + 400e-6, radius_, ++seed_, overlapping);
-    for (const Point& q : ends) {
-      if (space.connects(ball, q)) return q;
+    // Around a rim, the centre of a ball keeps its radius.
+    for (const double wider : {0.0, 2 * trial_.toolRadius_m}) {
+      FreeSpace space(reference_, middle, 5 * way + 400e-6 + wider, radius_, ++seed_, overlapping);
+      for (const Point& q : ends) {
+        if (space.connects(ball, q)) return q;
+      }
+      if (trial_.toolRadius_m == 0) break;
     }
     return std::nullopt;
   }

@@ -270,7 +270,7 @@ class Referee {
     const double spring = (p - hip_).norm();
     const bool unfinished = (rendering_.status & kUnfinished) != 0;
     const double away = (p - broughtBy_ - hip_).norm();
-    if (!rendering_.touching && away > rounding_ && (touchedBefore_ || !unfinished)) {
+    if (!rendering_.touching && away > rounding_ && (touchedBefore_ || !unfinished) && !touchesAsBall(away)) {
       return report("lost", "no contact, and the proxy is ", away, " m from the HIP");
     }
     // Frictionless, the place of the tick before was free and nearer.
@@ -279,7 +279,7 @@ class Referee {
     const bool popped = (rendering_.status & realtime::kRenderPopthrough) != 0;
     if (static_ && friction_ == 0 && tick_ > 0 && !popped &&
         now > before + kGap_m + 2e-3 * trial_.toolRadius_m && !unfinished && !oneSidedBall_ && !pops_ &&
-        !(now < before + kWedge_m && inWedge())) {
+        !(now < before + kWedge_m && inWedge()) && !leftSlit()) {
       return report("climbed", "the proxy moved from ", before, " m to ", now, " m from the HIP");
     }
     reference_.heights(p, proxyHeights_);
@@ -290,11 +290,37 @@ class Referee {
       judgeFreeForce();
   }
 
+  // A HIP that is free within the ball of the point tool: where the work of the tick ends, the report is
+  // still the ball, and where two faces meet within rounding, the HIP may be behind one that the ball does
+  // not touch.
+  bool touchesAsBall(double away) const {
+    if (trial_.toolRadius_m > 0 || away > 0.5 * kGap_m) return false;
+    if ((rendering_.status & realtime::kRenderWorkLimit) != 0) return true;
+    const std::vector<int> near = reference_.near(hip_, kGap_m);
+    return near.size() > 1 && std::any_of(near.begin(), near.end(), [&](int i) {
+             return reference_.crosses(i, rendering_.proxy_m, hip_, 0);
+           });
+  }
+
   // Where faces meet at an acute angle, the ball of the point tool does not reach as far as the reported
   // proxy.
   bool inWedge() const {
     return trial_.toolRadius_m == 0 && (reference_.near(proxyBefore_, kTouch_m).size() > 1 ||
                                         reference_.near(rendering_.proxy_m, kTouch_m).size() > 1);
+  }
+
+  // Between faces that leave the ball of a point tool no room, the HIP came from behind or past their rims,
+  // and the ball is where there is room, up to millimetres away. While the HIP is in front of all of them it
+  // is free, and the report is the HIP; with a force, the report is at the ball.
+  bool leftSlit() const {
+    if (trial_.toolRadius_m > 0 || touchedBefore_ || !rendering_.touching) return false;
+    FreeSpace space(reference_, proxyBefore_, kWedge_m, kFollower_m,
+                    trial_.seed + static_cast<std::uint64_t>(tick_));
+    const auto visible = [&](const Point& q) {
+      return std::none_of(space.faces().begin(), space.faces().end(),
+                          [&](int i) { return reference_.crosses(i, proxyBefore_, q, 0); });
+    };
+    return !space.placeNear(proxyBefore_, visible);
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
@@ -758,11 +784,15 @@ class Referee {
            better.transpose(), " is nearer");
   }
 
-  // Whether the faces at the proxy give this force to a ball there.
+  // Whether the faces at the proxy give this force to a ball there. A ball behind a one-sided face that the
+  // proxy is in front of may as well be in front of it: nothing is known of its room.
   bool isPushedTo(const Point& ball) const {
     std::vector<Point> normals;
     for (const int i : reference_.near(rendering_.proxy_m, kTouch_m)) {
       const Face& f = reference_.face(i);
+      const double height = f.normal.dot(rendering_.proxy_m - f.a);
+      if (reference_.touchableFrom(f, height) && !reference_.touchableFrom(f, f.normal.dot(ball - f.a)))
+        return false;
       const bool behind = f.normal.dot(ball - f.a) < 0;
       if (behind && f.unbounded) return false;
       normals.emplace_back(behind ? Point(-f.normal) : f.normal);
