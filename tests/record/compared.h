@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <iomanip>
 #include <set>
 #include <sstream>
 #include <string>
@@ -29,6 +30,19 @@ struct Compared {
   double largestRendered_N = 0;  // before the guard, which on a stalled machine lets little through
   std::string firstDifference;
 };
+
+/// To all digits, for last bits may be what differs.
+inline std::string summary(const realtime::TickReport& report) {
+  const realtime::Rendering& r = report.rendering;
+  const realtime::GuardReport& g = report.guard;
+  std::ostringstream text;
+  text << std::setprecision(17) << "revision " << report.revision << ", proxy " << r.proxy_m.transpose()
+       << ", status " << r.status << ", contacts " << r.contactCount << ", rendered " << r.force_N.transpose()
+       << ", written " << report.force_N.transpose() << ", gain " << g.gain << ", limit " << g.limit_N
+       << ", trips " << g.active << ' ' << g.latched << ", counts";
+  for (const std::uint32_t count : g.counts) text << ' ' << count;
+  return text.str();
+}
 
 /// One for each device.
 inline std::vector<Compared> rerender(const std::filesystem::path& file,
@@ -56,8 +70,9 @@ inline std::vector<Compared> rerender(const std::filesystem::path& file,
       ++compared.same;
     } else if (compared.firstDifference.empty()) {
       std::ostringstream text;
-      text << "tick " << tick.report.tick << " revision " << tick.report.revision << "/" << now->revision
-           << " force " << tick.report.force_N.transpose() << " / " << now->force_N.transpose();
+      text << "tick " << tick.report.tick << ", as recorded and as rendered again:\n"
+           << summary(tick.report) << '\n'
+           << summary(*now);
       compared.firstDifference = text.str();
     }
   }
