@@ -4,7 +4,7 @@
 #   scripts/test.sh --quick         the optimised build only
 #   scripts/test.sh --quick ROOM    the optimised tests of one folder below tests/, e.g. scene or realtime/render
 #   scripts/test.sh --long          all tests at full size (12 million segments and the like), clang-tidy, a build by clang
-# The last line is 'N passed, N failed', followed by ', N skipped' where tests were skipped. Logs: build/PRESET/test.log
+# The last line is 'N passed, N failed', followed by ', N skipped' where tests were skipped. Logs: build/PRESET/test*.log
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -38,7 +38,7 @@ if [ -n "$room" ] && [ ! -e "tests/$room/CMakeLists.txt" ]; then
   [ "${#programs[@]}" -gt 0 ] || { echo "no test program of tests/$room has sources of '$inner'" >&2; exit 2; }
 fi
 
-kAllowedFlaky=2  # of one preset
+kAllowedFlaky=2  # of one part
 jobs=$(nproc)
 total_passed=0
 total_failed=0
@@ -163,13 +163,15 @@ else
   scripts/install_packages.sh build test python
 fi
 
-# build_beside_tests PRESET: takes only the processor time that the tests leave, for many of them watch what happens within
+# From here on this process takes only the processor time that the tests leave, for many of them watch what happens within
 # milliseconds; a compiler of the same priority beside them makes them fail.
+give_way() { chrt --idle --pid 0 "$BASHPID" || renice 19 "$BASHPID" >/dev/null; }
+
+# build_beside_tests PRESET
 build_beside_tests() {
   give_way
   build "$1"
 }
-give_way() { chrt --idle --pid 0 "$BASHPID" || renice 19 "$BASHPID" >/dev/null; }
 
 # The tests of threads leave half of the processors' time.
 compute_beside_tests() {
@@ -198,7 +200,7 @@ for i in "${!presets[@]}"; do
   next=${presets[i + 1]:-}
   builder=""
   if [ -n "$next" ]; then
-    set -m  # a process group of its own, which the trap below ends with the script
+    set -m  # a process group of its own, which the trap above ends with the script
     build_beside_tests "$next" >"build/$next.build.log" 2>&1 &
     builder=$!
     set +m

@@ -71,6 +71,12 @@ TEST(Roles, ReportsAreWhatOnlyTheServerSends) {
   }
 }
 
+TEST(Roles, EachMessageOfTheTableHasOne) {
+  for (std::size_t i = 0; i < kMessageKinds; ++i) {
+    EXPECT_NE(role(kindAt(i)), Role::unknown) << info(kindAt(i)).name;
+  }
+}
+
 TEST(Roles, AreUnknownForNamesThatAreNotInTheTable) {
   EXPECT_EQ(role(kUnknownKind), Role::unknown);
   EXPECT_FALSE(needsControl(kUnknownKind));
