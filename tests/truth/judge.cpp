@@ -110,11 +110,13 @@ class Judge {
     for (const auto& [kind, ticks] : byKind_)
       std::printf("  %-10s %llu ticks\n", kind.c_str(), static_cast<unsigned long long>(ticks));
     std::printf(
-        "touching %llu, long rules %llu, searched %llu, undecided %llu; seeds %llu to %llu; %.2f us per "
+        "touching %llu, limited %llu, long rules %llu, searched %llu, undecided %llu; seeds %llu to %llu; "
+        "%.2f us per "
         "tick\n",
-        static_cast<unsigned long long>(sum_.touching), static_cast<unsigned long long>(sum_.longRules),
-        static_cast<unsigned long long>(sum_.suspected), static_cast<unsigned long long>(sum_.undecided),
-        static_cast<unsigned long long>(options_.seed), static_cast<unsigned long long>(seed - 1),
+        static_cast<unsigned long long>(sum_.touching), static_cast<unsigned long long>(sum_.limited),
+        static_cast<unsigned long long>(sum_.longRules), static_cast<unsigned long long>(sum_.suspected),
+        static_cast<unsigned long long>(sum_.undecided), static_cast<unsigned long long>(options_.seed),
+        static_cast<unsigned long long>(seed - 1),
         seconds() / static_cast<double>(std::max<std::uint64_t>(sum_.ticks, 1)) * 1e6);
     std::printf("judged %llu ticks of %llu trials, %d findings\n",
                 static_cast<unsigned long long>(sum_.ticks),
@@ -133,6 +135,7 @@ class Judge {
   void add(const Trial& trial, const Verdict& v) {
     sum_.ticks += v.ticks;
     sum_.touching += v.touching;
+    sum_.limited += v.limited;
     sum_.suspected += v.suspected;
     sum_.undecided += v.undecided;
     sum_.longRules += v.longRules;

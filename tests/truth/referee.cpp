@@ -129,6 +129,7 @@ class Referee {
     bringInFrontOfFaces();
     ++verdict_.ticks;
     verdict_.touching += rendering_.touching ? 1 : 0;
+    verdict_.limited += renderer_.energyShare() < 1 ? 1 : 0;
     judgeNumbers();
     if (verdict_.finding) return;
     judgePlaces();
@@ -239,9 +240,14 @@ class Referee {
     const double bound = stiffest_ * (spring * (1 + 1e-6) + kForceTolerance_m) * (1 + friction_) +
                          3 * damping_ * (velocity_.norm() + surfaceSpeed()) * (1 + friction_);
     if (!(r.contactForce_N.norm() <= bound)) {
-      report("force", r.contactForce_N.norm(), " N with the proxy ", spring, " m from the HIP; at most ",
-             bound, " N");
+      return report("force", r.contactForce_N.norm(), " N with the proxy ", spring,
+                    " m from the HIP; at most ", bound, " N");
     }
+    const double share = renderer_.energyShare();
+    // In slits narrower than the ball of a point, the proxy is where there is room.
+    const bool slits = trial_.kind == "sheets" || trial_.kind == "soup" || trial_.kind == "joined";
+    const bool simple = static_ && !slits && !mixedStiffness() && trial_.toolRadius_m == 0;
+    if (!(share > 0 && share <= 1) || (simple && share < 0.9)) report("share", share, " of the springs acts");
   }
 
   double surfaceSpeed() const {
@@ -542,6 +548,11 @@ class Referee {
     const Point way = hip_ - hipBefore_;
     work_J_ += 0.5 * (forceBefore_ + rendering_.contactForce_N).dot(way);
     workTolerance_J_ += 0.5 * (rendering_.contactForce_N - forceBefore_).norm() * way.norm();
+    // A share that returns takes energy from nobody.
+    const double returned = renderer_.energyShare() - shareBefore_;
+    shareBefore_ = renderer_.energyShare();
+    if (touchedBefore_ && rendering_.touching && returned > 0)
+      workTolerance_J_ += 0.5 * returned * stiffest_ * (rendering_.proxy_m - hip_).squaredNorm();
     if (work_J_ > workTolerance_J_ + 1e-9 + stiffest_ * kForceTolerance_m * kForceTolerance_m) {
       report("energy", "the hand gained ", work_J_, " J; the error of the sum is at most ", workTolerance_J_);
     }
@@ -714,7 +725,8 @@ class Referee {
     double spring_N = m.stiffness_N_per_m * std::max(0.0, depth);
     if (m.popthrough_N > 0 && m.popthrough_N < toRoom_N && spring_N > m.popthrough_N)
       spring_N = m.popthrough_N + std::max(0.0, spring_N - toRoom_N);
-    const Point expected = std::max(0.0, spring_N - m.damping_Ns_per_m * n.dot(velocity_)) * n;
+    const Point expected =
+        renderer_.energyShare() * std::max(0.0, spring_N - m.damping_Ns_per_m * n.dot(velocity_)) * n;
     const double off = (rendering_.normalForce_N - expected).norm();
     if (off > (1e-6 + joinedTilt(f)) * expected.norm() + m.stiffness_N_per_m * kForceTolerance_m) {
       report("law", "the force ", rendering_.normalForce_N.transpose(), " on one surface, expected ",
@@ -860,6 +872,7 @@ class Referee {
   Point proxyBefore_ = Point::Zero();
   Point forceBefore_ = Point::Zero();
   double work_J_ = 0;
+  double shareBefore_ = 1;
   double workTolerance_J_ = 0;
   double rounding_ = 0;           // of float coordinates: no side is decided below it
   Eigen::ArrayXd heightsBefore_;  // of the proxy

@@ -6,6 +6,7 @@
 // | status | no jump and no release: trials contain neither |
 // | fields | touching, depth, contact count and the sum of the contacts agree |
 // | force | F <= largest K * distance of proxy and HIP, plus damping and friction |
+// | share | static, one stiffness, a point, no slits: all of the springs act, but for 10 % |
 // | through | the proxy did not get where a ball of 4.9 µm can not follow: no face, no gap below 10 µm |
 // | escaped | the proxy is within the walls of the trial |
 // | lost | without contact the proxy is at the HIP |
@@ -13,9 +14,9 @@
 // | climbed | frictionless, static: the proxy never moves away from the HIP |
 // | stuck | frictionless, static: small moves reach no place that is nearer to the HIP by 10 µm |
 // | direction | the normal force is a non-negative sum of the normals of the faces at the proxy |
-// | law | one surface alone: F = (K depth - B v) normal |
+// | law | one surface alone: F = (K depth - B v) normal, times the share that acts |
 // | overlap | a ball overlaps no face |
-// | energy | static: the hand gains no energy over any contact, from free motion on |
+// | energy | static: the hand gains no more over any contact than what shares that return store |
 #pragma once
 
 #include <cstdint>
@@ -43,6 +44,7 @@ struct Verdict {
   std::optional<Finding> finding;  ///< the first one, which ends the trial
   std::uint64_t ticks = 0;
   std::uint64_t touching = 0;
+  std::uint64_t limited = 0;    ///< of those: a share of the springs acts, so that they give no energy
   std::uint64_t suspected = 0;  ///< moves near an edge of a face, judged by a search for a path
   std::uint64_t undecided = 0;  ///< of those: in a wedge too narrow to tell
   std::uint64_t longRules = 0;  ///< ticks that all rules judged

@@ -212,6 +212,8 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
   contactSet_.staticShare = slidingShare();
   slide_.active = wasSliding;
   slideTo(hip + held + slide_.direction * frictionConeOf(contactSet_), hip, active);
+  // It ends at an edge, beyond which another face may hold the proxy.
+  if (frictionConeOf(contactSet_) == 0) return updateWithoutFriction(hip, active);
   advanceSlide((position_ - start).norm());
   contactSet_.staticShare = slidingShare();
 }

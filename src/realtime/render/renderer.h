@@ -74,7 +74,7 @@ struct RenderOptions {
 
 /// Number of the laws from contact to force. It changes when the same ticks give other forces on purpose, so
 /// that a re-rendering can name the reason (docs/decisions/0009-stiffness-and-friction.md).
-inline constexpr std::uint32_t kForceLaw = 25;
+inline constexpr std::uint32_t kForceLaw = 26;
 
 /// Keeps the proxy from tick to tick. Construct it outside the loop; step() is realtime: noexcept, no
 /// allocation, no lock. One per servo; not thread-safe.
@@ -91,6 +91,8 @@ class Renderer {
             Rendering& out) noexcept;
   /// Of the last step().
   const PressedFaces& pressed() const noexcept;
+  /// Of the last step(): the share of the springs that acts, so that they give no more than the hand put in.
+  double energyShare() const noexcept;
 
   /// For a hand that may be anywhere: the next step() starts without contact at the HIP. Effects go on.
   void restart() noexcept;

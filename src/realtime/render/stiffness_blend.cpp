@@ -20,6 +20,7 @@ constexpr double kHiddenExcess = kHidden * kHidden - 1;
 constexpr double kFacing_m = 10e-6;  // a face that is lower than the proxy by less does not show its back
 constexpr double kQueryMargin = 1 + 1e-6;  // covers the rounding of queries that change frames
 constexpr double kSameDirection = 1e-7;    // |n1 x n2|^2 of faces that are one plane
+constexpr Nanos kLately = base::toNanos(kLongestTick_s);
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
 constexpr int kMaxVisits = 512;         // triangles in one search
@@ -170,11 +171,13 @@ class NeighbourSearch {
       Neighbour* const n = neighbourOf(plane.state->surface.stiffness_N_per_m);
       if (n == nullptr || !(n->distance > 0)) continue;
       consider(*n, nearestInGauge(gauge_, plane.facet, proxy_), plane.share);
+      rests_ = rests_ && (plane.rests || !(n->distance < width_));
     }
   }
   void addObjects();
 
   bool complete() const { return complete_; }
+  bool rests() const { return rests_; }
   const Neighbour* begin() const { return neighbours_.data(); }
   const Neighbour* end() const { return neighbours_.data() + count_; }
 
@@ -225,6 +228,7 @@ class NeighbourSearch {
   int count_ = 0;
   int visits_ = 0;
   bool complete_ = true;
+  bool rests_ = true;
 };
 
 void NeighbourSearch::addObjects() {
@@ -279,6 +283,9 @@ void NeighbourSearch::addObject(const scene::ObjectState& state) {
     }
     return reach();
   });
+  const Nanos lately = now_.time - kLately;
+  const bool moves = state.motion.movingAfter(lately) || state.mesh->deformingAfter(lately);
+  rests_ = rests_ && !(moves && n->distance < width_);
 }
 
 // The weight of a surface at distance t * width: 1 at 0, 0 at 1, and between two surfaces
@@ -379,6 +386,7 @@ BlendedSpring blendedSpring(const SceneAtTime& now, const ContactQuery& query, c
   search.addPlanes(planes);
   search.addObjects();
   out.complete = search.complete();
+  out.rests = search.rests();
   if (search.end() - search.begin() > 1) combine(search, gauge, width, contactSet, out);
   return out;
 }

@@ -18,6 +18,7 @@ struct BlendedSpring {
   double kappa_N_per_m = 0;      ///< kappa: the spring stores 1/2 kappa |p - h|^2
   Vec3 slope_N = Vec3::Zero();   ///< along the contact set, towards softer places
   Vec3 turn_N = Vec3::Zero();    ///< across an edge: from a surface that the touched faces hide partly
+  bool rests = true;             ///< false: what takes part in it moves or deforms, or did lately
   bool complete = true;          ///< false: more surfaces or triangles near the proxy than are searched
 };
 

@@ -1,0 +1,37 @@
+// A contact with what rests gives no more than the hand put into it.
+//
+// Between HIP and proxy is one spring, with the stiffness of what is near the proxy. Where the HIP passes the
+// middle of a body, the proxy goes around it in one tick, from a soft surface to a place beside a stiff one,
+// and a spring as long as the one before stores several times as much: it would throw the hand out. It acts
+// with the share that stores what there was. The share returns slowly: within a second.
+#pragma once
+
+#include "realtime/render/passivity_controller.h"
+
+namespace hapticd::realtime {
+
+/// One contact after the other. Servo thread: noexcept, no allocation.
+class EnergyLimit {
+ public:
+  /// What the springs of a tick say about the energy of the contact.
+  enum class Account {
+    kNone,    ///< something moves, or a command changed it: what is stored is taken as it is
+    kPaid,    ///< a surface yields: what the hand puts in counts, the springs act as they are
+    kLimited  ///< all rest
+  };
+
+  void reset() noexcept { *this = EnergyLimit(); }
+  /// The share of `springs` that acts in this tick, 0 … 1.
+  double step(const SpringState& springs, Account account, const Vec3& hip_m, double period_s) noexcept;
+  double share() const noexcept { return share_; }
+
+ private:
+  double share_ = 1;
+  bool open_ = false;  // what follows is of the last tick
+  double stiffness_N_per_m_ = 0;
+  double stored_J_ = 0;  // by what acted
+  Vec3 force_N_ = Vec3::Zero();
+  Vec3 hip_m_ = Vec3::Zero();
+};
+
+}  // namespace hapticd::realtime

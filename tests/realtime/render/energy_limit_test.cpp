@@ -1,0 +1,136 @@
+// The energy of a contact with what rests. The expected shares follow from 1/2 K d^2.
+#include "realtime/render/energy_limit.h"
+
+#include <gtest/gtest.h>
+
+#include "meshes.h"
+#include "scene_fixture.h"
+
+namespace hapticd::realtime::fixture {
+namespace {
+
+using Account = EnergyLimit::Account;
+
+constexpr double kPeriod_s = 1e-3;
+
+// A floor at z = 0 with the HIP at this depth.
+SpringState floorAt(double depth_m, double stiffness = 1000) {
+  SpringState springs;
+  springs.normal = Vec3::UnitZ();
+  springs.force_N = stiffness * depth_m * springs.normal;
+  springs.pressed_N = stiffness * depth_m;
+  springs.stored_J = 0.5 * stiffness * depth_m * depth_m;
+  springs.stiffness_N_per_m = stiffness;
+  return springs;
+}
+
+class EnergyLimitTest : public testing::Test {
+ protected:
+  EnergyLimit limit;
+
+  double press(double depth_m, double stiffness = 1000, Account account = Account::kLimited) {
+    return limit.step(floorAt(depth_m, stiffness), account, -depth_m * Vec3::UnitZ(), kPeriod_s);
+  }
+};
+
+TEST_F(EnergyLimitTest, A_floor_acts_wholly_at_any_speed) {
+  for (const double step_m : {1e-6, 1e-4, 1e-3, 3e-3}) {
+    limit.reset();
+    for (int i = 0; i <= 10; ++i) EXPECT_EQ(press(i * step_m), 1) << step_m;
+    for (int i = 10; i > 0; --i) EXPECT_EQ(press(i * step_m), 1) << step_m;
+  }
+}
+
+TEST_F(EnergyLimitTest, A_spring_that_stiffens_stores_what_there_was) {
+  press(4e-3, 100);
+  EXPECT_NEAR(press(4e-3, 1000), 0.1, 1e-9);
+}
+
+TEST_F(EnergyLimitTest, What_the_hand_puts_in_counts) {
+  press(4e-3, 100);
+  // The way of 10 um against the spring after it, which is the stronger one, and half of its own.
+  const double paid_J = 1e-5 * 1000 * 4.01e-3 + 0.5 * 1000 * 1e-10;
+  const double stored_J = 0.5 * 100 * 4e-3 * 4e-3;
+  EXPECT_NEAR(press(4.01e-3, 1000), (stored_J + paid_J) / (0.5 * 1000 * 4.01e-3 * 4.01e-3), 1e-9);
+}
+
+TEST_F(EnergyLimitTest, The_share_returns_within_a_second) {
+  press(4e-3, 100);
+  double share = press(4e-3, 1000);
+  for (int i = 1; i <= 950; ++i) {
+    const double next = press(4e-3, 1000);
+    ASSERT_GE(next, share);
+    ASSERT_LE(next - share, 1.001e-3);
+    share = next;
+    if (i == 500) {
+      EXPECT_NEAR(share, 0.6, 1e-6);
+    }
+  }
+  EXPECT_EQ(share, 1);
+}
+
+TEST_F(EnergyLimitTest, A_share_ends_with_its_contact) {
+  press(4e-3, 100);
+  EXPECT_LT(press(4e-3, 1000), 0.11);
+  EXPECT_EQ(limit.step(SpringState{}, Account::kLimited, Vec3::UnitZ(), kPeriod_s), 1);
+  EXPECT_EQ(press(1e-3, 1000), 1);
+}
+
+TEST_F(EnergyLimitTest, What_moves_or_a_command_stiffens_acts_wholly) {
+  press(4e-3, 100);
+  EXPECT_EQ(press(4e-3, 1000, Account::kNone), 1);
+  EXPECT_EQ(press(4e-3, 1000), 1);
+}
+
+// A face yields with 1 N, and beside it the spring of 4 mm goes on: what was paid is 1 N times the way.
+TEST_F(EnergyLimitTest, Behind_a_face_that_yields_acts_what_was_paid) {
+  press(1e-3);
+  for (int i = 1; i <= 30; ++i) {
+    SpringState springs = floorAt(1e-3 + i * 1e-4);
+    springs.force_N = Vec3::UnitZ();
+    EXPECT_EQ(limit.step(springs, Account::kPaid, -(1e-3 + i * 1e-4) * Vec3::UnitZ(), kPeriod_s), 1);
+  }
+  const double paid_J = 0.5e-3 + 3e-3 + 30 * 0.5 * 1000 * 1e-8;
+  EXPECT_NEAR(press(4e-3), paid_J / 8e-3, 1e-6);
+}
+
+// A floor of 100 N/m under the origin, and a plate of 2000 N/m in it.
+class EnergyShareTest : public testing::Test {
+ protected:
+  SceneFixture scene;
+
+  EnergyShareTest() { scene.add(plane(0.04), surface(100)); }
+
+  // Its centre; the plate is 4 mm wide.
+  scene::ObjectState& addPlate(const scene::Motion& motion) {
+    return scene.add(geometryOf(plane(0.002), 2), surface(2000), motion);
+  }
+  static Affine inFloor(double x) { return Affine(Eigen::Translation3d(x, 0, -0.05e-3)); }
+};
+
+TEST_F(EnergyShareTest, What_comes_near_brings_its_energy_with_it) {
+  addPlate(scene::Motion::between(inFloor(0.02), inFloor(0.0035), toNanos(0.2), toNanos(0.4)));
+  Hand hand(scene.snapshot());
+  hand.at(1e-3 * Vec3::UnitZ());
+  const double alone_N = hand.to(-2e-3 * Vec3::UnitZ()).contactForce_N.norm();
+  EXPECT_NEAR(alone_N, 0.2, 1e-6);
+  while (hand.time() < toNanos(0.6)) {
+    hand.at(-2e-3 * Vec3::UnitZ());
+    ASSERT_EQ(hand.renderer().energyShare(), 1);
+  }
+  EXPECT_GT(hand.now().contactForce_N.norm(), 1.5 * alone_N);
+}
+
+TEST_F(EnergyShareTest, A_command_brings_its_energy_with_it) {
+  Hand hand(scene.snapshot());
+  hand.at(1e-3 * Vec3::UnitZ());
+  hand.to(-2e-3 * Vec3::UnitZ());
+  scene = SceneFixture();
+  scene.add(plane(0.04), surface(1000));
+  hand.show(scene.snapshot());
+  EXPECT_NEAR(hand.at(-2e-3 * Vec3::UnitZ()).contactForce_N.norm(), 2, 1e-6);
+  EXPECT_NEAR(hand.at(-2e-3 * Vec3::UnitZ()).contactForce_N.norm(), 2, 1e-6);
+}
+
+}  // namespace
+}  // namespace hapticd::realtime::fixture
