@@ -37,6 +37,9 @@ class Reader {
   }
   void field(const std::string& key, std::string& out) {
     takeExact<std::string>(key, out, "a quoted string");
+    if (out.find('\0') != std::string::npos) {
+      fail(*find(key), key, "a quoted string without NUL characters");
+    }
   }
   void field(const std::string& key, std::vector<std::string>& out) {
     takeList(key, out, "a list of quoted strings");
