@@ -33,8 +33,10 @@ def parse(text: str) -> Address:
     device, at, rest = text.partition("@")
     if not at or not device or "\0" in device or len(device.encode()) > MAX_NAME_BYTES:
         raise ValueError(f"device {text!r}: expected {form}")
+    if rest.startswith(("[", "tcp://[")) or rest.count("::"):
+        raise ValueError(f"device {text!r}: IPv6 addresses are not supported; use a name or an IPv4 address")
     match = _FORM.fullmatch(rest)
-    if match is None:
+    if match is None or (match.group(3) or "").startswith("/"):
         raise ValueError(f"device {text!r}: expected {form}")
     tcp, host, digits = match.groups()
     port = DEFAULT_PORT

@@ -610,6 +610,13 @@ class Core(Commands):
         if not self.connected and self._counts.connections and not self.options.reconnect:
             raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
 
+    def _check_kept(self, connection: int) -> None:
+        """After waiting for the system to accept everything: raises ConnectionLost without the connection of this number."""
+        if not self._counts.connections:
+            raise ConnectionLost(f"nothing is sent yet: {self._why_not_connected()}")
+        if not self.connected or self._counts.connections != connection:
+            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+
     def _not_acknowledged(self) -> str:
         return f"{self.server} acknowledged nothing for {self.options.send_timeout:g} s"
 

@@ -547,8 +547,7 @@ class Client(Core):
                             f"{self.server} accepted no data for {self.options.send_timeout:g} s; {waiting} bytes wait to "
                             "be sent"
                         )
-        if not self.connected or self._counts.connections != connection:
-            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+        self._check_kept(connection)
 
     async def upload_mesh(
         self,

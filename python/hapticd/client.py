@@ -491,8 +491,7 @@ class Client(Core):
                 )
                 self._fail(why)
                 raise ConnectionLost(why)
-        if not self.connected or self._counts.connections != connection:
-            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+        self._check_kept(connection)
 
     # --- polling
 
