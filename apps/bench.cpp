@@ -34,6 +34,7 @@ void addBench(CLI::App& app) {
   // The suite reads all arguments itself, --help too.
   command->set_help_flag();
   command->prefix_command();
+  command->footer("'hapticd bench --help' lists the options, 'hapticd bench --list' the benchmarks.");
   command->callback([command] { runSuite(command->remaining()); });
 }
 

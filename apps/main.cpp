@@ -7,6 +7,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/nearest_name.h"
@@ -30,14 +31,20 @@ std::vector<std::string> commandNames(const CLI::App& app) {
   return names;
 }
 
-// Names the option that was typed wrong, of the innermost command. False when there was none.
-bool explainUnknownOption(const CLI::App& app) {
+// The innermost command that was typed, and its name.
+std::pair<const CLI::App*, std::string> typedCommand(const CLI::App& app) {
   const CLI::App* command = &app;
   std::string name = "hapticd";
   while (!command->get_subcommands().empty()) {
     command = command->get_subcommands().front();
     name += ' ' + command->get_name();
   }
+  return {command, name};
+}
+
+// Names the option that was typed wrong, of the innermost command. False when there was none.
+bool explainUnknownOption(const CLI::App& app) {
+  const auto [command, name] = typedCommand(app);
   const std::vector<std::string> rest = app.remaining(true);
   const auto typed =
       std::find_if(rest.begin(), rest.end(), [](const std::string& text) { return text.starts_with("-"); });
@@ -50,6 +57,36 @@ bool explainUnknownOption(const CLI::App& app) {
   std::fprintf(stderr, "%s: unknown option '%s';%s '%s --help' lists the options\n", name.c_str(),
                option.c_str(), suggestion(option, names).c_str(), name.c_str());
   return true;
+}
+
+// Names the command that does not exist. False when none was typed.
+bool explainUnknownCommand(const CLI::App& app) {
+  const std::vector<std::string> rest = app.remaining();
+  if (!app.get_subcommands().empty() || rest.empty() || rest[0].starts_with("-")) return false;
+  std::fprintf(stderr, "hapticd: unknown command '%s';%s 'hapticd --help' lists the commands\n",
+               rest[0].c_str(), suggestion(rest[0], commandNames(app)).c_str());
+  return true;
+}
+
+// CLI11's own texts name neither the command nor, for some errors, what to do.
+std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
+  const std::string text = error.what();
+  const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
+  if (code == CLI::ExitCodes::ExtrasError) return "unexpected argument '" + app.remaining(true).front() + "'";
+  if (code != CLI::ExitCodes::ArgumentMismatch) return text;
+  const std::string option = text.substr(0, text.find(':'));
+  return option + (text.ends_with("missing") ? " needs a value" : " is given more than once");
+}
+
+// The exit status after an error on the command line, which it prints, or after --help and --version.
+int explain(const CLI::App& app, const CLI::ParseError& error) {
+  if (explainUnknownCommand(app)) return 2;
+  if (error.get_exit_code() == 0) return app.exit(error);
+  if (explainUnknownOption(app)) return 2;
+  const std::string name = typedCommand(app).second;
+  std::fprintf(stderr, "%s: %s; '%s --help' lists the options\n", name.c_str(), textOf(app, error).c_str(),
+               name.c_str());
+  return 2;
 }
 
 // The next file or socket would take the number of a standard stream that is closed, and its messages.
@@ -109,20 +146,8 @@ int main(int argc, char** argv) {
   addDeviceHost(app);
   try {
     app.parse(wordsOf(argc, argv));
-  } catch (const CLI::RequiredError& error) {
-    const std::vector<std::string> rest = app.remaining();
-    if (app.get_subcommands().empty() && !rest.empty()) {
-      if (rest[0].starts_with("-") && explainUnknownOption(app)) return 2;
-      std::fprintf(stderr, "hapticd: unknown command '%s';%s 'hapticd --help' lists the commands\n",
-                   rest[0].c_str(), suggestion(rest[0], commandNames(app)).c_str());
-      return 2;
-    }
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const CLI::ExtrasError& error) {
-    if (explainUnknownOption(app)) return 2;
-    return app.exit(error) == 0 ? 0 : 2;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return explain(app, error);
   } catch (const hapticd::server::ConfigError& error) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 2;

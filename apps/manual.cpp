@@ -60,6 +60,13 @@ std::vector<const CLI::Option*> optionsOf(const CLI::App& app) {
   return options;
 }
 
+// Lines that stay lines.
+std::string roffLines(const std::string& text) {
+  std::string out;
+  for (const std::string& line : linesOf(text)) out += (out.empty() ? "" : "\n.br\n") + roff(line);
+  return out;
+}
+
 bool takesValue(const CLI::Option& option) {
   return option.get_items_expected_max() > 0;
 }
@@ -83,19 +90,18 @@ std::string manPage(const CLI::App& command, const std::string& name) {
       page +=
           ".TP\n.BR " + roff("hapticd-" + each->get_name()) + " (1)\n" + roff(each->get_description()) + "\n";
   }
-  page += ".SH OPTIONS\n";
+  if (!optionsOf(command).empty()) page += ".SH OPTIONS\n";
   for (const CLI::Option* option : optionsOf(command)) {
     std::string names = option->get_name(true, true);
     for (std::size_t at = 0; (at = names.find(',', at)) != std::string::npos; at += 2)
       names.replace(at, 1, ", ");
     if (takesValue(*option)) names += " " + option->get_type_name();
-    page += ".TP\n.B " + roff(names) + "\n" + roff(option->get_description());
+    page += ".TP\n.B " + roff(names) + "\n" + roffLines(option->get_description());
     if (!option->get_default_str().empty()) page += " [" + roff(option->get_default_str()) + "]";
     page += "\n";
   }
   if (!command.get_footer().empty()) page += ".SH NOTES\n.nf\n" + roff(command.get_footer()) + "\n.fi\n";
-  page += ".SH SEE ALSO\n.BR hapticd (1)";
-  return page + ", /usr/share/doc/hapticd\n";
+  return page + ".SH SEE ALSO\n.BR hapticd (1),\n/usr/share/doc/hapticd-doc\n";
 }
 
 std::string bashCompletion(const CLI::App& app) {
@@ -104,7 +110,9 @@ std::string bashCompletion(const CLI::App& app) {
       "  local cur=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]} words=\n"
       "  if [ \"$COMP_CWORD\" = 1 ]; then\n    words='";
   for (const CLI::App* command : commandsOf(app)) text += command->get_name() + " ";
-  text += "--help --version'\n  else\n    case $command in\n";
+  text += "--help --version'\n  else\n    case $command in\n      help) words='";
+  for (const CLI::App* command : commandsOf(app)) text += command->get_name() + " ";
+  text += "' ;;\n";
   for (const CLI::App* command : commandsOf(app)) {
     text += "      " + command->get_name() + ") words='";
     for (const CLI::Option* option : optionsOf(*command)) {
@@ -113,8 +121,9 @@ std::string bashCompletion(const CLI::App& app) {
     text += "' ;;\n";
   }
   return text +
-         "    esac\n  fi\n  COMPREPLY=($(compgen -W \"$words\" -- \"$cur\"))\n"
-         "  [[ $cur == -* ]] || [ \"$COMP_CWORD\" = 1 ] || COMPREPLY+=($(compgen -f -- \"$cur\"))\n}\n"
+         "    esac\n  fi\n  mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
+         "  [[ $cur == -* ]] || [ \"$COMP_CWORD\" = 1 ] || [ $command = help ] ||\n"
+         "    mapfile -t -O ${#COMPREPLY[@]} COMPREPLY < <(compgen -f -- \"$cur\")\n}\n"
          "complete -o filenames -F _hapticd hapticd\n";
 }
 

@@ -130,7 +130,7 @@ server::ServerConfig configOf(const ServeOptions& options, std::vector<std::stri
   if (!options.names.empty()) config.devices.front().names = options.names;
   applyFlags(options, config.devices.front());
   // vrpn.cfg has no fields for most flags, so they apply to all of its devices.
-  if (file.extension() == ".cfg") {
+  if (server::isVrpnCfg(file)) {
     for (server::DeviceConfig& device : config.devices) applyFlags(options, device);
   }
   server::validate(config);

@@ -34,7 +34,7 @@ std::vector<const Benchmark*> chosen(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto same = [&](const Benchmark* b) { return b->name == name; };
     if (std::none_of(result.begin(), result.end(), same))
-      throw std::runtime_error("there is no benchmark '" + name + "'; hapticd bench --list names them");
+      throw std::invalid_argument("there is no benchmark '" + name + "'; hapticd bench --list names them");
   }
   return result;
 }
@@ -60,11 +60,12 @@ int run(const Options& options) {
     for (const Benchmark& b : benchmarks()) std::printf("%-12s %s\n", b.name.c_str(), b.what.c_str());
     return 0;
   }
+  const std::vector<const Benchmark*> toRun = chosen(options.names);
   Run run;
   run.length = options.longest ? Length::longest : options.full ? Length::full : Length::windows;
   for (const std::string& line : describeMachine(run.length)) std::printf("%s\n", line.c_str());
   std::vector<Measured> all;
-  for (const Benchmark* benchmark : chosen(options.names)) {
+  for (const Benchmark* benchmark : toRun) {
     run.progress = [&](const std::string& text) {
       std::fprintf(stderr, "[%s] %s\n", benchmark->name.c_str(), text.c_str());
     };
@@ -116,8 +117,14 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     return run(options);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    std::fprintf(stderr, "hapticd bench: %s; 'hapticd bench --help' lists the options\n", error.what());
+    return 2;
+  } catch (const std::invalid_argument& error) {
+    std::fprintf(stderr, "hapticd bench: %s\n", error.what());
+    return 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "hapticd bench: %s\n", error.what());
     return 1;

@@ -4,6 +4,7 @@ import re
 import socket
 from typing import NamedTuple, Tuple
 
+from ._codec import shortened
 from ._peer import DEFAULT_PORT, MAX_NAME_BYTES
 from .errors import ConnectError
 
@@ -26,12 +27,16 @@ _FORM = re.compile(r"(?:(tcp:)|x-vrpn:)?(?://)?([^\s/@:]{1,255})(?::(.*))?", re.
 
 def parse(text: str) -> Address:
     """NAME@host, NAME@host:port or NAME@tcp://host:port. Raises ValueError for another form."""
-    device, at, rest = text.partition("@")
     form = "NAME@host, NAME@host:port or NAME@tcp://host:port"
-    if not at or not device or len(device.encode()) > MAX_NAME_BYTES:
+    if not isinstance(text, str):
+        raise ValueError(f"device {shortened(text)}: expected {form}")
+    device, at, rest = text.partition("@")
+    if not at or not device or "\0" in device or len(device.encode()) > MAX_NAME_BYTES:
         raise ValueError(f"device {text!r}: expected {form}")
+    if rest.startswith(("[", "tcp://[")) or rest.count("::"):
+        raise ValueError(f"device {text!r}: IPv6 addresses are not supported; use a name or an IPv4 address")
     match = _FORM.fullmatch(rest)
-    if match is None:
+    if match is None or (match.group(3) or "").startswith("/"):
         raise ValueError(f"device {text!r}: expected {form}")
     tcp, host, digits = match.groups()
     port = DEFAULT_PORT
@@ -46,7 +51,7 @@ def resolve(address: Address) -> Tuple[str, int]:
     """Numeric IPv4 address and port; may block. Raises ConnectError for an unknown host."""
     try:
         found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter for a name that no host can have
         raise ConnectError(f"no server at {address.server}: {error}") from error
     host, port = found[0][4][:2]
     return str(host), int(port)

@@ -101,6 +101,13 @@ class Layout(Generic[M]):
 
     def encode(self, message: M) -> bytes:
         """The payload of a message. Raises ValueError for a value that does not fit its field."""
+        try:
+            return self._encode(message)
+        except (struct.error, OverflowError, TypeError) as error:
+            wrong = next(filter(None, map(_misfit, message, self.fields)), str(error))
+            raise ValueError(f"{self.name}: {wrong}") from error
+
+    def _encode(self, message: M) -> bytes:
         values: List[Any] = []
         tail = b""
         for value, field in zip(message, self.fields):
@@ -114,19 +121,44 @@ class Layout(Generic[M]):
                 if len(value) > field.count:
                     raise ValueError(f"{self.name}: {field.name} has {len(value)} values, at most {field.count}")
                 values.append(len(value))
-                tail = np.asarray(value).astype(">" + _DTYPES[field.letter]).tobytes()
+                tail = struct.pack(f">{len(value)}{field.letter}", *value)
             else:
                 values.append(_text(value, field))
+        return self._struct.pack(*values) + tail
+
+
+def shortened(value: Any) -> str:
+    """A value as error texts name it."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 100 else text[:97] + "..."
+
+
+def _misfit(value: Any, field: _Field) -> str:
+    """Why a value does not fit its field; empty when it does."""
+    if field.form in ("name", "text"):
+        return "" if isinstance(value, str) else f"{field.name} is {shortened(value)}, expected a text"
+    expected = _EXPECTED.get(field.letter, "a number")
+    if field.form != "one" and not hasattr(value, "__len__"):
+        return f"{field.name} is {shortened(value)}, expected a list of numbers"
+    for one in (value,) if field.form == "one" else value:
         try:
-            return self._struct.pack(*values) + tail
-        except (struct.error, OverflowError) as error:
-            raise ValueError(f"{self.name}: {error}, got {message!r}") from error
+            struct.pack(">" + field.letter, one)
+        except (struct.error, OverflowError, TypeError):
+            return f"{field.name} {'is' if field.form == 'one' else 'has'} {shortened(one)}, expected {expected}"
+    return ""
 
 
-_DTYPES = {"B": "u1", "h": "i2", "i": "i4", "I": "u4", "q": "i8", "Q": "u8", "f": "f4", "d": "f8"}
+def _integer(bits: int, signed: bool) -> str:
+    least = -(1 << (bits - 1)) if signed else 0
+    return f"an integer from {least} to {least + (1 << bits) - 1}"
+
+
+_EXPECTED = {letter: _integer(8 * struct.calcsize(">" + letter), letter.islower()) for letter in "BhiIqQ"}
 
 
 def _text(value: str, field: _Field) -> bytes:
+    if not isinstance(value, str):
+        raise TypeError
     encoded = value.encode("utf-8")
     most = field.count - 1 if field.form == "text" else field.count
     if len(encoded) > most:
@@ -134,6 +166,22 @@ def _text(value: str, field: _Field) -> bytes:
     if b"\0" in encoded:  # the receiver would take it for the end
         raise ValueError(f"{field.name} {value!r} has a NUL character")
     return encoded
+
+
+def real_array(values: Any, what: str, expected: str) -> "npt.NDArray[Any]":
+    """Numbers as an array; the names are for error texts. Raises ValueError for texts, complex and masked numbers, and rows of
+    different lengths."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "O":
+            array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{what} {shortened(values)}: give {expected}") from error
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{what} of type {array.dtype}: give {expected}")
+    if isinstance(values, np.ma.MaskedArray) and np.any(values.mask):
+        raise ValueError(f"{what} with masked values: give {expected}, without a mask")
+    return array
 
 
 def define(cls: Type[M], name: str, rows: Tuple[Tuple[Any, ...], ...]) -> Layout[M]:

@@ -1,29 +1,46 @@
 """Commands: from calls to messages of the wire. Both faces of the client inherit them."""
 
-from typing import Any, Sequence
+from typing import Any, Sequence, Type, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _messages as m
-from ._codec import Numbers
+from ._codec import Numbers, real_array, shortened
 from .scene import IDENTITY, ButtonMode, Effect, Faces, ForceField, Plane, PlaneTexture, Surface
 from .reports import Severity
 
 #: The button number that means all buttons.
 ALL_BUTTONS = -99
 
+T = TypeVar("T")
+
 _PROPERTIES = ("stiffness", "damping", "static friction", "dynamic friction", "popthrough", "mass")
 
 
 def _column_major(matrix: Any) -> "npt.NDArray[np.float64]":
     """A 4x4 array column by column; 16 numbers are taken as they are."""
-    array = np.asarray(matrix, dtype=np.float64)
+    expected = "a 4x4 array, or 16 numbers column by column"
+    array = real_array(matrix, "a matrix", expected).astype(np.float64)
     if array.shape == (4, 4):
         return array.T.ravel()
     if array.shape == (16,):
         return array
-    raise ValueError(f"a matrix of shape {array.shape}: give a 4x4 array, or 16 numbers column by column")
+    raise ValueError(f"a matrix of shape {array.shape}: give {expected}")
+
+
+def instance(value: Any, cls: Type[T]) -> T:
+    """The value. Raises ValueError when it is of another class, which might lack fields."""
+    if not isinstance(value, cls):
+        raise ValueError(f"{shortened(value)}: give a hapticd.{cls.__name__}")
+    return value
+
+
+def flag(value: bool) -> int:
+    """A truth as messages carry it. Raises ValueError for what is none."""
+    if not isinstance(value, (bool, np.bool_)) and value not in (0, 1):
+        raise ValueError(f"{shortened(value)}: give True or False")
+    return int(value)
 
 
 class Commands:
@@ -32,6 +49,10 @@ class Commands:
     def _send(self, message: Any, fast: bool = False) -> None:
         """Sends a message of the device, stamped now, in the order of the calls; `fast`: by datagram where there
         are any."""
+        raise NotImplementedError
+
+    def _send_all(self, *messages: Any) -> None:
+        """Sends messages, or none when a value of one does not fit."""
         raise NotImplementedError
 
     # --- Scene, in world units. Objects are numbered from 0; object 0 always exists.
@@ -47,8 +68,8 @@ class Commands:
 
     def set_surface(self, object: int, surface: Surface) -> None:
         """Sets all properties of an object's surface."""
-        for name, value in zip(_PROPERTIES, surface):
-            self._send(m.SetHapticProperty(object, name, value))
+        values = zip(_PROPERTIES, instance(surface, Surface))
+        self._send_all(*(m.SetHapticProperty(object, name, value) for name, value in values))
 
     def set_surface_property(self, object: int, property: str, value: float) -> None:
         """Sets one property: "stiffness", "damping", "static friction", "dynamic friction", "popthrough" (0 to 1)
@@ -62,17 +83,18 @@ class Commands:
 
     def set_touchable(self, object: int, touchable: bool) -> None:
         """Starts or stops rendering an object."""
-        self._send(m.SetObjectIsTouchable(object, int(touchable)))
+        self._send(m.SetObjectIsTouchable(object, flag(touchable)))
 
     def set_touchable_faces(self, faces: Faces) -> None:
         """Chooses which sides of all objects are rendered; both initially."""
-        self._send(m.SetTouchableFace(int(faces)))
+        self._send(m.SetTouchableFace(faces))
 
     def set_workspace_box(self, min: Numbers, max: Numbers, model: "npt.ArrayLike" = IDENTITY) -> None:
         """Fits the device's workspace to a box of the world, seen through a model matrix (world to eye)."""
-        if len(min) != 3 or len(max) != 3:
-            raise ValueError(f"corners of {len(min)} and {len(max)} numbers: give 3 numbers each")
-        self._send(m.SetWorkspaceBoundingBox(_column_major(model), (*min, *max)))
+        corners = [real_array(corner, "a corner", "3 numbers") for corner in (min, max)]
+        if corners[0].shape != (3,) or corners[1].shape != (3,):
+            raise ValueError(f"corners {shortened(min)} and {shortened(max)}: give 3 numbers each")
+        self._send(m.SetWorkspaceBoundingBox(_column_major(model), (*corners[0], *corners[1])))
 
     def set_workspace_projection(self, model: "npt.ArrayLike", projection: "npt.ArrayLike") -> None:
         """Fits the device's workspace to the view volume of an OpenGL camera."""
@@ -81,7 +103,7 @@ class Commands:
     def set_effect(self, index: int, effect: Effect) -> None:
         """Defines or redefines an effect by its number, 0 or more; a running one changes in place. At most 64
         effects. An effect ends when the client that set it leaves, over 250 ms."""
-        self._send(m.Effect(effect.type, index, *effect[1:]))
+        self._send(m.Effect(instance(effect, Effect).type, index, *effect[1:]))
 
     def start_effect(self, index: int) -> None:
         """Starts an effect, or restarts it."""
@@ -142,11 +164,11 @@ class Commands:
     def update_mesh(self, object: int, surface: Surface) -> None:
         """Makes preceding edits of the mesh take effect. The surface is in stock units: a stiffness of 1 is 1000
         N/m, a damping of 0.005, which is the maximum, is 5 N s/m. Popthrough and mass are not sent."""
-        self._send(m.UpdateTrimeshChanges(object, *surface[:4]))
+        self._send(m.UpdateTrimeshChanges(object, *instance(surface, Surface)[:4]))
 
     def transform_mesh(self, object: int, matrix: "npt.ArrayLike") -> None:
         """Transforms the vertices within their object by a 4x4 array with the translation in [:3, 3]."""
-        array = np.asarray(matrix, dtype=np.float64)
+        array = real_array(matrix, "a matrix", "a 4x4 array")
         if array.shape != (4, 4):
             raise ValueError(f"a matrix of shape {array.shape}: give a 4x4 array")
         self._send(m.TransformTrimesh(object, array.ravel()))
@@ -180,14 +202,14 @@ class Commands:
 
     def set_plane(self, plane: Plane) -> None:
         """Starts or changes the plane of this index."""
-        p = plane
+        p = instance(plane, Plane)
         self._send(
             m.Plane(p.plane, p.stiffness, p.damping, p.dynamic_friction, p.static_friction, p.index, p.recovery_ms)
         )
 
     def set_plane_texture(self, texture: PlaneTexture) -> None:
         """Sets adhesion, texture and buzz of plane 0."""
-        self._send(m.Plane2(*texture))
+        self._send(m.Plane2(*instance(texture, PlaneTexture)))
 
     def stop_plane(self, index: int = 0) -> None:
         """Removes the plane of this index."""
@@ -196,7 +218,7 @@ class Commands:
     def set_force_field(self, field: ForceField) -> None:
         """Sets the force field of the device. Sent by datagram where the connection has them: a lost or late one is
         not repeated, so send it again and again."""
-        jacobian = np.asarray(field.jacobian_N_per_m, dtype=np.float64).ravel()
+        jacobian = real_array(instance(field, ForceField).jacobian_N_per_m, "a jacobian", "9 numbers, or a 3x3 array").ravel()
         self._send(m.ForceField(field.origin_m, field.force_N, jacobian, field.radius_m), fast=True)
 
     def stop_force_field(self) -> None:
@@ -216,11 +238,7 @@ class Commands:
         self._constrain(3, stiffness_N_per_m, m.ConstraintPlanePoint(point_m), m.ConstraintPlaneNormal(normal))
 
     def _constrain(self, mode: int, stiffness: float, *places: Any) -> None:
-        self._send(m.ConstraintMode(mode))
-        for place in places:
-            self._send(place)
-        self._send(m.ConstraintStiffness(stiffness))
-        self._send(m.ConstraintEnable(1))
+        self._send_all(m.ConstraintMode(mode), *places, m.ConstraintStiffness(stiffness), m.ConstraintEnable(1))
 
     def release_constraint(self) -> None:
         """Ends the constraint."""
@@ -259,9 +277,9 @@ class Commands:
 
     def set_button_mode(self, button: int, mode: ButtonMode) -> None:
         """Makes a button, or all (ALL_BUTTONS), momentary or a toggle."""
-        self._send(m.ButtonAdmin(button, int(mode)))
+        self._send(m.ButtonAdmin(button, mode))
 
     def send_text(self, text: str, severity: Severity = Severity.NORMAL) -> None:
         """Sends a text, which servers of this project write to their log. Raises ValueError for more than 1023
         bytes."""
-        self._send(m.Text(int(severity), 0, text))
+        self._send(m.Text(severity, 0, text))

@@ -3,10 +3,12 @@
 import copy
 import os
 import secrets
+import struct
 import time
 import weakref
 from collections import deque
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
@@ -15,8 +17,8 @@ import numpy.typing as npt
 from . import _messages as m
 from . import reports as r
 from ._address import Address
-from ._codec import HEADER, DecodeError, Numbers, by_class, frame, padded
-from ._commands import Commands
+from ._codec import HEADER, DecodeError, Numbers, by_class, frame, padded, real_array, shortened
+from ._commands import Commands, flag, instance
 from ._peer import Peer, now
 from ._statistics import Statistics
 from .errors import ConnectError, ConnectionLost, ServerError, Unsupported
@@ -56,6 +58,21 @@ class Options:
     send_timeout: float = 10.0  # how long the server may accept no data while data waits
     queue_limit_bytes: int = 4 * 1024 * 1024  # that may wait to be sent; a command that would exceed them sleeps
     throw_on_error: bool = False  # poll() raises ServerError for a text of severity error, after the callbacks
+
+    def __post_init__(self) -> None:
+        for name in ("connect_timeout", "send_timeout", "queue_limit_bytes"):
+            value = getattr(self, name)
+            if not isinstance(value, Real) or not float(value) >= 0:
+                raise ValueError(f"{name} is {shortened(value)}: give a number of at least 0")
+
+
+def options_of(options: Optional[Options], fields: Dict[str, Any]) -> Options:
+    """The options that are given whole, or by the names of single ones. Raises ValueError."""
+    if options is None:
+        return Options(**fields)
+    if fields:
+        raise ValueError("give either options or single fields of it")
+    return instance(options, Options)
 
 
 class UploadProgress(NamedTuple):
@@ -191,11 +208,11 @@ _SET_VERTEX_ROW = np.dtype(
 
 
 def as_vertices(vertices: "npt.ArrayLike") -> "npt.NDArray[Any]":
-    """(n, 3) positions in wire order. Raises ValueError for another shape."""
-    array = np.ascontiguousarray(vertices, dtype=">f4")
+    """(n, 3) positions in wire order. Raises ValueError for another shape, and for what is no number."""
+    array = real_array(vertices, "vertices", "(n, 3) numbers")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"vertices of shape {array.shape}: give (n, 3)")
-    return array
+    return np.ascontiguousarray(array, dtype=">f4")
 
 
 def as_corners(corners: "npt.ArrayLike") -> "npt.NDArray[Any]":
@@ -208,13 +225,44 @@ def as_corners(corners: "npt.ArrayLike") -> "npt.NDArray[Any]":
 
 def as_triangles(triangles: "npt.ArrayLike", vertices: int) -> "npt.NDArray[Any]":
     """(m, 3) vertex numbers in wire order. Raises ValueError for another shape, or a vertex that is not there."""
-    given = np.asarray(triangles)
+    given = real_array(triangles, "triangles", "(m, 3) integers")
     if given.ndim != 2 or given.shape[1] != 3 or not (given.dtype.kind in "iu" or given.size == 0):
         raise ValueError(f"triangles of shape {given.shape} and type {given.dtype}: give (m, 3) integers")
     if given.size and (given.min() < 0 or given.max() >= vertices):
         wrong = np.argwhere((given < 0) | (given >= vertices))[0]
         raise ValueError(f"triangle {wrong[0]} names vertex {given[tuple(wrong)]}, the mesh has {vertices}")
     return np.ascontiguousarray(given, dtype=">i4")
+
+
+_CONTACT: Final = struct.Struct("24d")
+
+
+def _contact_numbers(contact: RemoteContact) -> Tuple[float, ...]:
+    """Raises ValueError for a vector that does not have three numbers, and for what is no number."""
+    c = instance(contact, RemoteContact)
+    try:
+        point, normal, axis, velocity, turn = (
+            (*v,) for v in (c.point_m, c.normal, c.axis, c.velocity_m_per_s, c.angular_velocity_rad_per_s)
+        )
+        if not len(point) == len(normal) == len(axis) == len(velocity) == len(turn) == 3:
+            raise ValueError
+        numbers = (
+            c.id, c.shape, c.radius_m, *point, *normal, *axis, *velocity, *turn, c.stiffness_N_per_m, c.damping_Ns_per_m,
+            c.static_friction, c.dynamic_friction, c.lifetime_s, c.yields,
+        )  # fmt: skip
+        _CONTACT.pack(*numbers)
+    except (struct.error, TypeError, ValueError, OverflowError) as error:
+        raise ValueError(
+            f"remote contacts: {contact}: give three numbers for each vector, and one for every other member"
+        ) from error
+    return numbers
+
+
+def duration(seconds: float) -> float:
+    """A time in seconds. Raises ValueError for what is no number, which no time would end."""
+    if not isinstance(seconds, Real) or seconds != seconds:
+        raise ValueError(f"{shortened(seconds)}: give a time in seconds")
+    return float(seconds)
 
 
 #: The clients of this process.
@@ -494,14 +542,17 @@ class Core(Commands):
         return frame(*now(), 0, number, layout.encode(message))
 
     def _send(self, message: Any, fast: bool = False) -> None:
-        one = self._frame(message)
         if fast and self._held is None and self.connected:
             assert self._peer is not None
+            one = self._frame(message)
             self._peer.send_fast(one)
             self._counts.messages_out += 1
             self._collected(len(one))
         else:
-            self._send_frames([one], 1)
+            self._send_all(message)
+
+    def _send_all(self, *messages: Any) -> None:
+        self._send_frames([self._frame(message) for message in messages], len(messages))
 
     def _send_frames(self, frames: List[bytes], messages: int) -> None:
         """Whole frames of commands, in this order: into the batch, to the peer, or kept for the first connection;
@@ -558,6 +609,13 @@ class Core(Commands):
         """Raises ConnectionLost when the connection has ended and no other will follow."""
         if not self.connected and self._counts.connections and not self.options.reconnect:
             raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
+
+    def _check_kept(self, connection: int) -> None:
+        """After waiting for the system to accept everything: raises ConnectionLost without the connection of this number."""
+        if not self._counts.connections:
+            raise ConnectionLost(f"nothing is sent yet: {self._why_not_connected()}")
+        if not self.connected or self._counts.connections != connection:
+            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
 
     def _not_acknowledged(self) -> str:
         return f"{self.server} acknowledged nothing for {self.options.send_timeout:g} s"
@@ -637,6 +695,8 @@ class Core(Commands):
     # here, and not on the next connection.
 
     def _set_token(self, token: str) -> None:
+        if not isinstance(token, str):
+            raise ValueError(f"present_token(): {shortened(token)}: give a text")
         if token and not 16 <= len(token.encode()) <= 128:
             raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
         self._check_open()
@@ -647,7 +707,7 @@ class Core(Commands):
 
     def _set_subscription(self, kinds: Reports, rate_Hz: float) -> None:
         self._check_open()
-        subscription = m.Subscribe(int(kinds), rate_Hz)
+        subscription = m.Subscribe(kinds, rate_Hz)
         self._frame(subscription)
         self._subscription = subscription
         if rate_Hz > 0:
@@ -665,12 +725,12 @@ class Core(Commands):
 
     @staticmethod
     def _check_rate(rate_Hz: float) -> None:
-        if not 0 <= rate_Hz < float("inf"):
-            raise ValueError(f"a report rate of {rate_Hz} Hz: give 0 (as it is) or more")
+        if not isinstance(rate_Hz, Real) or not 0 <= rate_Hz < float("inf"):
+            raise ValueError(f"a report rate of {shortened(rate_Hz)} Hz: give 0 (as it is) or more")
 
     def _set_heartbeats(self, enable: bool) -> None:
         self._check_open()
-        self._heartbeats = bool(enable)
+        self._heartbeats = bool(flag(enable))
         if self.connected:
             self._heartbeat_at = time.monotonic() + HEARTBEAT_S
             self._put_now(m.Heartbeat(int(self._heartbeats)))
@@ -678,15 +738,11 @@ class Core(Commands):
     # --- streamed state
 
     def _put_contacts(self, contacts: Sequence[RemoteContact]) -> None:
+        if not hasattr(contacts, "__len__"):
+            raise ValueError(f"{shortened(contacts)}: give a list of hapticd.RemoteContact")
         if len(contacts) > 16:
             raise ValueError(f"{len(contacts)} remote contacts: give the 16 nearest to the hand")
-        numbers: List[float] = []
-        for c in contacts:
-            numbers += (c.id, c.shape, c.radius_m, *c.point_m, *c.normal, *c.axis, *c.velocity_m_per_s)
-            numbers += (*c.angular_velocity_rad_per_s, c.stiffness_N_per_m, c.damping_Ns_per_m, c.static_friction)
-            numbers += (c.dynamic_friction, c.lifetime_s, c.yields)
-            if any(len(v) != 3 for v in (c.point_m, c.normal, c.axis, c.velocity_m_per_s, c.angular_velocity_rad_per_s)):
-                raise ValueError("remote contacts: give three numbers for each vector")
+        numbers = [number for contact in contacts for number in _contact_numbers(contact)]
         self._put_now(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
 
     def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:
@@ -762,6 +818,7 @@ class Core(Commands):
     def set_vertices(self, object: int, first: int, positions: "npt.ArrayLike") -> None:
         """Sets vertices from number `first` on, for meshes that deform: (n, 3), object units, object frame."""
         rows = as_vertices(positions)
+        self._frame(m.SetVertex(object, first))  # raises for a wrong number
         if self._has(m.FEATURE_BULK_MESH):
             frames = self._run_frames(m.MeshVertices, object, first, rows)
             self._send_frames(frames, len(frames))
@@ -771,12 +828,14 @@ class Core(Commands):
     # --- callbacks
 
     def _on(self, kind: str, callback: Callable[[Report], object]) -> "Subscription[Report]":
+        if not callable(callback):
+            raise ValueError(f"{shortened(callback)}: give a function that takes one report")
         return Subscription(self._callbacks[kind], callback)
 
     def on(self, kind: str, callback: Callable[[Any], object]) -> "Subscription[Any]":
         """Adds a callback for a kind of reports by its name, as in hapticd.reports.KINDS, or "connection"."""
-        if kind not in self._callbacks:
-            raise ValueError(f"no reports of kind {kind!r}; there are {', '.join(self._callbacks)}")
+        if not isinstance(kind, str) or kind not in self._callbacks:
+            raise ValueError(f"no reports of kind {shortened(kind)}; there are {', '.join(self._callbacks)}")
         return self._on(kind, callback)
 
     def on_pose(self, callback: Callable[[r.PoseReport], object]) -> "Subscription[r.PoseReport]":

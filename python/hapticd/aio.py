@@ -41,6 +41,8 @@ from ._core import (
     as_corners,
     as_triangles,
     as_vertices,
+    duration,
+    options_of,
 )
 from ._peer import ProtocolError
 from .client import LossWatch, has_ended, unacknowledged
@@ -449,7 +451,7 @@ class Client(Core):
     async def wait_connected(self, timeout: float) -> None:
         """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError, and
         ConnectionLost after close()."""
-        start = self._loop.time()
+        timeout, start = duration(timeout), self._loop.time()
         if not await self._wait(lambda: self.connected, timeout):
             raise ConnectError(f"{self.device}: {self._why_not_connected()}")
         left = timeout - (self._loop.time() - start)
@@ -475,7 +477,7 @@ class Client(Core):
         """Waits up to `timeout` seconds for the next reports, and returns how many arrived. Raises ServerError
         (Options.throw_on_error), and ConnectionLost after close()."""
         before = self._counts.messages_in
-        await self._wait(lambda: self._counts.messages_in != before, timeout)
+        await self._wait(lambda: self._counts.messages_in != before, duration(timeout))
         self._raise_first_error()
         return self._counts.messages_in - before
 
@@ -507,7 +509,7 @@ class Client(Core):
             return bool(waiting)
 
         with self.on(kind, waiting.append):
-            deadline = self._loop.time() + seconds
+            deadline = self._loop.time() + duration(seconds)
             while True:
                 await self._wait(arrived, min(deadline - self._loop.time(), 3600.0))
                 if waiting:
@@ -545,8 +547,7 @@ class Client(Core):
                             f"{self.server} accepted no data for {self.options.send_timeout:g} s; {waiting} bytes wait to "
                             "be sent"
                         )
-        if not self.connected or self._counts.connections != connection:
-            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+        self._check_kept(connection)
 
     async def upload_mesh(
         self,
@@ -794,6 +795,4 @@ class _Connecting:
 
 def connect(device: str, options: Optional[Options] = None, **fields: Any) -> _Connecting:
     """`hand = await connect(...)` or `async with connect(...) as hand`; arguments as in hapticd.connect()."""
-    if options is not None and fields:
-        raise ValueError("give either options or single fields of it")
-    return _Connecting(device, options or Options(**fields))
+    return _Connecting(device, options_of(options, fields))

@@ -40,6 +40,8 @@ from ._core import (
     as_corners,
     as_triangles,
     as_vertices,
+    duration,
+    options_of,
 )
 from ._peer import ProtocolError
 from .errors import ConnectError, ConnectionLost
@@ -489,8 +491,7 @@ class Client(Core):
                 )
                 self._fail(why)
                 raise ConnectionLost(why)
-        if not self.connected or self._counts.connections != connection:
-            raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
+        self._check_kept(connection)
 
     # --- polling
 
@@ -500,6 +501,7 @@ class Client(Core):
         callbacks. Raises what callbacks raise, ServerError (Options.throw_on_error), and ConnectionLost after
         close()."""
         self._check_open()
+        timeout = duration(timeout)
         count = self._dispatch()
         deadline = time.monotonic() + timeout
         while not (count and self._inbox):  # else callbacks polled, and the rest waits for the next call
@@ -513,8 +515,8 @@ class Client(Core):
 
     def run_for(self, seconds: float) -> None:
         """Polls for the whole duration. Raises as poll()."""
-        deadline = time.monotonic() + seconds
-        left = seconds
+        left = duration(seconds)
+        deadline = time.monotonic() + left
         while left > 0:
             self.poll(left)
             left = deadline - time.monotonic()
@@ -525,7 +527,7 @@ class Client(Core):
         Options.reconnect is false."""
         waiting: Deque[Any] = deque()
         with self.on(kind, waiting.append):
-            deadline = time.monotonic() + seconds
+            deadline = time.monotonic() + duration(seconds)
             while True:
                 while waiting:
                     yield waiting.popleft()
@@ -541,8 +543,8 @@ class Client(Core):
         r.dtype_of(kind)
         waiting: List[Any] = []
         with self.on(kind, waiting.append):
-            deadline = time.monotonic() + seconds
-            left = seconds
+            left = duration(seconds)
+            deadline = time.monotonic() + left
             while left > 0:
                 self._check_renewed()
                 self.poll(min(left, 3600.0))
@@ -569,7 +571,7 @@ class Client(Core):
         """Waits for a connection and for an answer of the device, so many seconds. Raises ConnectError, and
         ConnectionLost after close()."""
         self._check_open()
-        start = time.monotonic()
+        timeout, start = duration(timeout), time.monotonic()
         if not self._wait(lambda: self.connected, timeout):
             raise ConnectError(f"{self.device}: {self._why_not_connected()}")
         left = timeout - (time.monotonic() - start)
@@ -810,6 +812,4 @@ def connect(device: str, options: Optional[Options] = None, **fields: Any) -> Cl
     reports by UDP), or NAME@tcp://host:port (one TCP connection, which passes most firewalls). The port is 3883
     unless given. Options by name: connect("Phantom@localhost", throw_on_error=True). Raises ValueError for another
     form, and ConnectError when there is no such server or device within connect_timeout."""
-    if options is not None and fields:
-        raise ValueError("give either options or single fields of it")
-    return Client(device, options or Options(**fields))
+    return Client(device, options_of(options, fields))

@@ -503,8 +503,8 @@ class Session:
                     return number
             known = ", ".join(name for one in self.devices for name in one.names)
             raise KeyError(f"no device {device!r} in '{self.path}'; there is {known}")
-        if not 0 <= device < len(self.devices):
-            raise KeyError(f"no device {device} in '{self.path}'; there are {len(self.devices)}")
+        if device not in range(len(self.devices)):
+            raise KeyError(f"no device {device!r} in '{self.path}'; there are {len(self.devices)}")
         return device
 
     @property

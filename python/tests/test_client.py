@@ -1,5 +1,6 @@
 """The synchronous client against a real server with the simulated hand, and against scripted VRPN servers."""
 
+import asyncio
 import contextlib
 import gc
 import os
@@ -324,6 +325,21 @@ def test_a_stop_that_nothing_receives_raises(way: str) -> None:
         server.reader.join(30)
 
 
+def test_a_flush_before_the_first_connection_says_that_there_is_none() -> None:
+    scripted = ScriptedServer()
+    with hapticd.connect(scripted.name, connect_timeout=0) as hand:
+        hand.set_object_count(2)
+        with pytest.raises(hapticd.ConnectionLost, match="nothing is sent yet: no VRPN server at "):
+            hand.flush_all()
+
+    async def run() -> None:
+        async with hapticd.aio.connect(scripted.name, connect_timeout=0) as hand:
+            with pytest.raises(hapticd.ConnectionLost, match="nothing is sent yet: no VRPN server at "):
+                await hand.flush_all()
+
+    asyncio.run(run())
+
+
 def test_a_stop_before_the_first_connection_raises() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -454,6 +470,11 @@ def test_a_peer_that_does_not_read_is_not_lost(monkeypatch: pytest.MonkeyPatch) 
 def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
     with pytest.raises(ValueError, match="expected NAME@host"):
         hapticd.connect("localhost")
+    for host in ("[::1]:3883", "tcp://[::1]:3883", "::1"):
+        with pytest.raises(ValueError, match="IPv6 addresses are not supported; use a name or an IPv4 address"):
+            hapticd.connect("Phantom@" + host)
+    with pytest.raises(ValueError, match="expected NAME@host"):
+        hapticd.connect("Phantom@http://localhost:3883")
     with pytest.raises(ValueError, match="port '99999', expected 1 to 65535"):
         hapticd.connect("Phantom@localhost:99999")
     with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):

@@ -11,6 +11,14 @@ using namespace std::chrono_literals;
 
 namespace {
 
+// With timeouts that fit in every unit in which they are counted.
+ClientOptions limited(ClientOptions options) {
+  options.connectTimeout =
+      std::min<std::chrono::milliseconds>(options.connectTimeout, client::Link::kLongestWait);
+  options.sendTimeout = std::min<std::chrono::milliseconds>(options.sendTimeout, client::Link::kLongestWait);
+  return options;
+}
+
 client::LinkOptions linkOptions(const ClientOptions& options) {
   return {.reconnect = options.reconnect,
           .sendTimeout = options.sendTimeout,
@@ -31,8 +39,8 @@ std::string joined(const std::vector<std::string>& names) {
 Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& clientOptions)
     : device(address.device),
       server(address.server.text()),
-      options(clientOptions),
-      link(address.server, linkOptions(clientOptions)),
+      options(limited(clientOptions)),
+      link(address.server, linkOptions(options)),
       sender(link.addDevice(address.device)),
       key(base::world().random.next() | 1) {
   link.onUp = [this] { greet(); };
@@ -42,6 +50,7 @@ Client::Impl::Impl(const client::DeviceAddress& address, const ClientOptions& cl
 void Client::Impl::waitConnected(Duration timeout) {
   constexpr Duration kShortestAnswer = 1s;  // also when the connection took nearly all of the timeout
   const base::Nanos start = base::now();
+  timeout = std::max(timeout, Duration::zero());
   if (!link.waitConnected(timeout)) throw ConnectError(device + ": " + link.whyNotConnected());
   const Duration left = timeout - Duration(base::now() - start);
   if (!link.waitHeard(sender, std::max(left, kShortestAnswer))) {
@@ -62,7 +71,7 @@ std::size_t Client::Impl::poll(Duration timeout) {
 
 Client::Client(std::string_view device, const ClientOptions& options)
     : impl_(std::make_unique<Impl>(client::parseDevice(device), options)) {
-  if (options.connectTimeout > 0ms) impl_->waitConnected(options.connectTimeout);
+  if (options.connectTimeout > 0ms) impl_->waitConnected(impl_->options.connectTimeout);
 }
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
@@ -74,7 +83,7 @@ std::size_t Client::poll(Duration timeout) {
 
 void Client::runFor(Duration duration) {
   const base::Nanos start = base::now();
-  for (Duration left = duration; left > 0ns; left = duration - Duration(base::now() - start))
+  for (Duration left = std::max(duration, 0ns); left > 0ns; left = duration - Duration(base::now() - start))
     impl_->poll(left);
 }
 

@@ -20,7 +20,7 @@ void Client::setSurface(int object, const Surface& s) {
   setSurfaceProperty(object, "mass", s.mass_kg);
 }
 void Client::setSurfaceProperty(int object, std::string_view property, float value) {
-  Impl::requireLength("setSurfaceProperty()", property, decltype(wire::SetHapticProperty::property)::kMost);
+  Impl::requireFits("setSurfaceProperty()", property, decltype(wire::SetHapticProperty::property)::kMost);
   impl_->send(wire::SetHapticProperty{object, property, value});
 }
 void Client::setTransform(int object, const Matrix4& T_world_object) {
@@ -187,7 +187,7 @@ void Client::setButtonMode(int button, ButtonMode mode) {
   impl_->send(wire::ButtonAdmin{button, static_cast<std::int32_t>(mode)});
 }
 void Client::sendText(std::string_view text, Severity severity) {
-  Impl::requireLength("sendText()", text, decltype(wire::Text::text)::kMost);
+  Impl::requireFits("sendText()", text, decltype(wire::Text::text)::kMost);
   impl_->send(wire::Text{static_cast<std::uint32_t>(severity), 0, std::string(text)});
 }
 

@@ -5,6 +5,7 @@
 #include "base/world.h"
 #include "client/client_impl.h"
 #include "wire/codec.h"
+#include "wire/text.h"
 
 namespace hapticd {
 
@@ -136,19 +137,22 @@ void Client::stopForces() {
   impl_->require(wire::kFeatureStop, "stop the forces");
 }
 
-void Client::Impl::requireLength(std::string_view call, std::string_view text, std::size_t most) {
+void Client::Impl::requireFits(std::string_view call, std::string_view text, std::size_t most) {
   if (text.size() > most)
     throw std::invalid_argument(std::string(call) + ": " + std::to_string(text.size()) +
                                 " bytes of text; at most " + std::to_string(most));
+  if (text.find('\0') != std::string_view::npos)  // the receiver would take it for the end
+    throw std::invalid_argument(std::string(call) + ": the text " + wire::inQuotes(text) +
+                                " has a NUL character");
 }
 
 void Client::mark(std::string_view text) {
-  Impl::requireLength("mark()", text, decltype(wire::Marker::text)::kMost);
+  Impl::requireFits("mark()", text, decltype(wire::Marker::text)::kMost);
   impl_->sendAtOnce(wire::Marker{.time = 0, .text = std::string(text)}, "not marked");
 }
 
 void Client::setObjectName(int object, std::string_view name) {
-  Impl::requireLength("setObjectName()", name, decltype(wire::SetObjectName::text)::kMost);
+  Impl::requireFits("setObjectName()", name, decltype(wire::SetObjectName::text)::kMost);
   impl_->send(wire::SetObjectName{object, name});
 }
 
@@ -192,6 +196,7 @@ void Client::presentToken(std::string_view token) {
     throw std::invalid_argument("presentToken(): " + std::to_string(token.size()) +
                                 " characters; a token has 16 to 128");
   }
+  Impl::requireFits("presentToken()", token, wire::Identify::kLongestToken);
   impl_->token = token;
   if (connected() && !token.empty()) impl_->link.sendNow(impl_->sender, impl_->identity());
 }

@@ -53,7 +53,7 @@ struct HAPTICD_HIDDEN Client::Impl {
   /// Client::stopForces().
   void stopBesideBacklog();
   /// Throws std::invalid_argument for a text that the wire would cut.
-  static void requireLength(std::string_view call, std::string_view text, std::size_t most);
+  static void requireFits(std::string_view call, std::string_view text, std::size_t most);
   bool has(wire::Feature feature) const { return offer && (offer->features & feature) != 0; }
   void sendRuns(int object, std::size_t first, std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<std::uint32_t, 3>> triangles, const std::function<void()>& check);

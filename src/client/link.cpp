@@ -207,7 +207,7 @@ bool Link::waitHeard(wire::LocalSender device, Duration timeout) {
 
 bool Link::waitUntil(const std::function<bool()>& condition, Duration timeout) {
   flush();
-  const base::Nanos deadline = base::now() + std::min(timeout, kLongestWait).count();
+  const base::Nanos deadline = base::now() + std::min<Duration>(timeout, kLongestWait).count();
   while (!condition()) {
     const Duration left(deadline - base::now());
     if (left <= Duration::zero()) return false;

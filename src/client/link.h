@@ -55,6 +55,7 @@ struct LinkStatistics {
 class Link {
  public:
   using Handler = std::function<void(const Arrival&)>;
+  static constexpr std::chrono::hours kLongestWait{24};  ///< A deadline must not overflow.
 
   /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
@@ -184,8 +185,6 @@ class Link {
   LinkStatistics statistics() const;
 
  private:
-  static constexpr Duration kLongestWait = std::chrono::hours(24);  // a deadline must not overflow
-
   /// Whether the handshake is complete, on a connection that may have failed since.
   bool handshakeDone() const noexcept { return peer_ && peer_->connected(); }
   void attempt();

@@ -129,7 +129,7 @@ std::size_t Link::poll(Duration timeout, const Handler& handler) {
     flush();
     return count;
   }
-  const base::Nanos deadline = base::now() + std::min(timeout, kLongestWait).count();
+  const base::Nanos deadline = base::now() + std::min<Duration>(timeout, kLongestWait).count();
   do {
     const Duration left(count > 0 ? 0 : deadline - base::now());
     loop_.runOnce(std::max(left, Duration::zero()));
@@ -263,6 +263,7 @@ void Link::drainTo(std::size_t bytes) {
       throw ConnectionLost(why);
     }
   }
+  if (connections_ == 0) throw ConnectionLost("nothing is sent yet: " + whyNotConnected());
   if (!connected() || connections_ != number) {
     throw ConnectionLost("connection to " + server_.text() + " lost while sending: " + lastFailure_);
   }

@@ -52,4 +52,16 @@ done
 for page in $(command -v man >/dev/null && echo "$work"/share/man/man1/*.1); do
   [ -z "$(man --warnings -l "$page" 2>&1 >/dev/null)" ] || { man --warnings -l "$page" 2>&1 >/dev/null | head; exit 1; }
 done
-bash -n "$work/share/bash-completion/completions/hapticd"
+# Lines of an option stay lines, a page has no empty part, and the documents are where the package has them.
+grep -qFx .br "$work/share/man/man1/hapticd-serve.1"
+! grep -A1 -x '.SH OPTIONS' "$work/share/man/man1/hapticd-bench.1" | grep -qx '.SH SEE ALSO' || exit 1
+grep -q 'hapticd bench .*help' "$work/share/man/man1/hapticd-bench.1"
+for page in "$work"/share/man/man1/*.1; do tail -1 "$page" | grep -qx /usr/share/doc/hapticd-doc; done
+completes() { # completes WORD...: what bash offers for the last word, one a line
+  (cd "$work/files" && . "$work/share/bash-completion/completions/hapticd" && COMP_WORDS=(hapticd "$@") COMP_CWORD=$# && _hapticd && printf '%s\n' "${COMPREPLY[@]}")
+}
+mkdir "$work/files"
+touch "$work/files/my mesh.obj"
+completes touch m | grep -qx 'my mesh.obj'
+[ "$(completes serve --po)" = --port ]
+[ "$(completes help wat)" = watch ]

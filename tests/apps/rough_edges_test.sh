@@ -19,6 +19,18 @@ cmp <("$hapticd" help) <("$hapticd" --help)
 cmp <("$hapticd" help plot) <("$hapticd" plot --help)
 refused 2 "hapticd serve: unknown option '--recrod'; did you mean '--record'?" "$hapticd" serve --recrod x
 refused 2 "hapticd record: unknown option '--nothing-alike'; 'hapticd record --help'" "$hapticd" record Phantom@localhost --nothing-alike=3
+refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" help xyzzyx
+refused 2 "hapticd touch: unknown option '--nothing-alike'" "$hapticd" touch --nothing-alike
+refused 2 "hapticd touch: mesh is required; 'hapticd touch --help'" "$hapticd" touch
+refused 2 "hapticd: unknown command ''; 'hapticd --help'" "$hapticd" ''
+refused 2 "hapticd: A subcommand is required; 'hapticd --help'" "$hapticd"
+refused 2 "hapticd serve: unexpected argument 'first'; 'hapticd serve --help'" "$hapticd" serve first second
+refused 2 "hapticd watch: unexpected argument 'third'; 'hapticd watch --help'" "$hapticd" watch Phantom@localhost third fourth
+refused 2 "hapticd serve: --port needs a value; 'hapticd serve --help'" "$hapticd" serve --port
+refused 2 "hapticd serve: --port is given more than once; 'hapticd serve --help'" "$hapticd" serve --port 1 --port 2
+refused 2 "hapticd serve: --port: Value x not in range 0 to 65535; 'hapticd serve --help'" "$hapticd" serve --port x
+refused 2 "hapticd bench: there is no benchmark 'xyzzyx'; hapticd bench --list" "$hapticd" bench xyzzyx
+refused 2 "hapticd bench: The following argument was not expected: --nothing-alike; 'hapticd bench --help'" "$hapticd" bench --nothing-alike
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 2 "excludes" "$hapticd" record Phantom@localhost --server --end --seconds 5

@@ -158,6 +158,25 @@ TEST(Client, KeepsCommandsBeforeTheFirstConnection) {
   EXPECT_TRUE(is(received[1], wire::StartEffect{4}));
 }
 
+TEST_P(BothWays, TheLongestTimeoutsWaitAndDoNotOverflow) {
+  ScriptedServer server;
+  constexpr auto kForEver = std::chrono::milliseconds::max();
+  Client client(name(server), {.connectTimeout = kForEver, .sendTimeout = kForEver, .queueLimit_bytes = 1});
+  client.waitConnected(Client::Duration::max());
+  client.waitConnected(Client::Duration::min());
+  client.runFor(Client::Duration::min());
+  for (int i = 0; i < 3000; ++i) client.setVertex(0, i, 0, 0, 0);
+  client.flushAll();
+  EXPECT_TRUE(client.connected());
+}
+
+TEST(Client, AFlushBeforeTheFirstConnectionSaysThatThereIsNone) {
+  Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms});
+  client.setObjectCount(2);
+  EXPECT_THAT(textOf<ConnectionLost>([&] { client.flushAll(); }),
+              HasSubstr("nothing is sent yet: no VRPN server at 127.0.0.1:1: "));
+}
+
 TEST(Client, CommandsBeforeTheFirstConnectionAreBounded) {
   Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms, .queueLimit_bytes = 100000});
   const auto fill = [&] {

@@ -330,6 +330,16 @@ TEST(Extensions, TextsThatTheWireWouldCutAreRefused) {
               HasSubstr("1023"));
   EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setSurfaceProperty(0, std::string(21, 's'), 1); }),
               HasSubstr("20"));
+  constexpr std::string_view kCut("stiff\0ness, 16 bytes",
+                                  21);  // the receiver would take the NUL for the end
+  const auto isCut = [&](auto&& command) {
+    EXPECT_THAT(textOf<std::invalid_argument>(command), HasSubstr("a NUL character"));
+  };
+  isCut([&] { client.mark(kCut); });
+  isCut([&] { client.setObjectName(0, kCut); });
+  isCut([&] { client.sendText(kCut); });
+  isCut([&] { client.setSurfaceProperty(0, kCut.substr(0, 10), 1); });
+  isCut([&] { client.presentToken(kCut); });
   client.mark(std::string(255, 'm'));
   client.setObjectName(0, std::string(64, 'n'));
   client.flushAll();

@@ -112,8 +112,8 @@ TEST_F(BadValues, VerticesTrianglesPlanesAndEffectsOutOfRangeAreRefused) {
     bad_.send(plane(number, -0.02F, 1));
     EXPECT_TRUE(gotText("sendSurface plane " + text));
   }
-  bad_.send(wire::SetTriangle{0, 0, {0, -1, 2}, {-1, -1, -1}});
-  EXPECT_TRUE(gotText("setTriangle object 0, triangle 0, vertices 0 -1 2: refused"));
+  bad_.send(wire::SetTriangle{0, 0, {0, -3, 2}, {-1, -1, -1}});
+  EXPECT_TRUE(gotText("setTriangle object 0, triangle 0, vertices 0 -3 2: refused"));
   bad_.send(plainEffect("constant", -1));
   EXPECT_TRUE(gotText("setEffect -1"));
   bad_.send(wire::StopEffect{kLargest});

@@ -403,6 +403,25 @@ TEST(Server, ARequestForAMissingDeviceIsLoggedWithTheAvailableOnes) {
             1U);
 }
 
+TEST(Server, ARequestForAMirrorThatIsOffNamesTheKeyThatOffersIt) {
+  Log log;
+  {
+    RunningServer server;
+    for (const char* name : {"Phantom.touch", "Fantom.touch"}) {
+      ScriptedPeer peer(server.address(), name);
+      ASSERT_TRUE(peer.untilConnected());
+      peer.sendBytes(std::vector<std::byte>(24));
+      ASSERT_TRUE(peer.until([&] { return !peer.open(); }));
+    }
+  }
+  EXPECT_EQ(
+      countOf("requested the device \"Phantom.touch\", which does not exist; available: Phantom; 'mirrors = "
+              "true' in its [[device]] offers it",
+              log.text()),
+      1U);
+  EXPECT_EQ(countOf("mirrors", log.text()), 1U);
+}
+
 TEST(Server, AReverseConnectionToTheServerItselfIsRefused) {
   Log log;
   {

@@ -3,7 +3,8 @@
 import math
 import time
 from collections import deque
-from typing import Any, Deque, Dict, Optional
+from numbers import Real
+from typing import Any, Callable, Deque, Dict, Optional, Tuple
 
 import numpy as np
 from lerobot.teleoperators.teleoperator import Teleoperator
@@ -20,6 +21,38 @@ _CONTACT = (
 _EFFECT = 63  # the last of the server's 64 effects: a program beside this one starts from 0
 _PLANE = 7  # likewise
 _SENSORS = {"proxy": 0, "hand": 1}
+
+
+#: What the fields of the configuration must be.
+_FINITE = ("a finite number", math.isfinite)
+_NOT_NEGATIVE = ("a finite number of at least 0", lambda value: 0 <= value < math.inf)
+_LIMITS: Dict[str, Tuple[str, Callable[[float], bool]]] = {
+    "scale": ("a finite number other than 0", lambda value: value != 0 and math.isfinite(value)),
+    "gripper_open_rad": ("a finite number above 0", lambda value: 0 < value < math.inf),
+    **dict.fromkeys(("offset_x", "offset_y", "offset_z"), _FINITE),
+    **dict.fromkeys(("rate_Hz", "buttons", "feedback_hold_s", "max_force_N"), _NOT_NEGATIVE),
+}
+
+
+def _check(config: HapticdTeleopConfig) -> None:
+    """Raises ValueError for a field that would fail only in the session."""
+    if config.point not in _SENSORS:
+        raise ValueError(f'point {config.point!r}: expected "hand" or "proxy"')
+    for name, (expected, holds) in _LIMITS.items():
+        value = getattr(config, name)
+        if not isinstance(value, Real) or not holds(float(value)):
+            raise ValueError(f"{name} {value!r}: expected {expected}")
+
+
+def _finite(name: str, value: Any) -> float:
+    """A number of the feedback; of an array or tensor with one number, too."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"feedback {name} {value!r}: expected a finite number")
+    return number
 
 
 class HapticdTeleop(Teleoperator):
@@ -41,10 +74,7 @@ class HapticdTeleop(Teleoperator):
     name = "hapticd"
 
     def __init__(self, config: HapticdTeleopConfig) -> None:
-        if config.point not in _SENSORS:
-            raise ValueError(f'point {config.point!r}: expected "hand" or "proxy"')
-        if config.scale == 0 or not math.isfinite(config.scale):
-            raise ValueError(f"scale {config.scale}: expected a number other than 0")
+        _check(config)
         self._hand: Optional[hapticd.Client] = None
         super().__init__(config)
         self.config = config
@@ -148,15 +178,18 @@ class HapticdTeleop(Teleoperator):
         unknown = set(feedback) - set(self.feedback_features)
         if unknown:
             raise ValueError(f"feedback {sorted(unknown)}: expected {', '.join(self.feedback_features)}")
-        if not all(math.isfinite(float(value)) for value in feedback.values()):
-            raise ValueError(f"feedback with a value that is not finite: {feedback}")
+        numbers = {name: _finite(name, value) for name, value in feedback.items()}
+        force_N = np.array([numbers.get(name, 0.0) for name in _FORCE])
+        contact = [numbers.get(name, 0.0) for name in _CONTACT]
+        if contact[6] > 0 and np.linalg.norm(contact[3:6]) == 0:
+            raise ValueError("a contact with the normal 0, 0, 0: give contact_nx, contact_ny, contact_nz")
         self._feedback_at = time.monotonic()
         if self._connections:  # nothing of what was felt through another one goes on
             self._connections.clear()
             self._force = self._contact = False
         # What it does not name ends: the caller would otherwise renew it for ever by feedback of another kind.
-        self._send_force(hand, np.array([float(feedback.get(name, 0.0)) for name in _FORCE]))
-        self._send_contact(hand, [float(feedback.get(name, 0.0)) for name in _CONTACT])
+        self._send_force(hand, force_N)
+        self._send_contact(hand, contact)
         self._beat(hand)
         hand.flush()
 
@@ -182,16 +215,13 @@ class HapticdTeleop(Teleoperator):
     def _send_contact(self, hand: hapticd.Client, contact: "list[float]") -> None:
         point = (np.array(contact[:3]) - self._offset) / self.config.scale  # in the frame of the device
         normal = np.array(contact[3:6]) * math.copysign(1.0, self.config.scale)
-        length = float(np.linalg.norm(normal))
         stiffness = contact[6]
         if stiffness <= 0:
             if self._contact:
                 hand.stop_plane(_PLANE)
             self._contact = False
             return
-        if length == 0:
-            raise ValueError("a contact with the normal 0, 0, 0: give contact_nx, contact_ny, contact_nz")
-        normal /= length
+        normal /= float(np.linalg.norm(normal))
         hand.set_plane(
             hapticd.Plane((*normal, -float(normal @ point)), min(stiffness / 1000.0, 1.0), index=_PLANE, recovery_ms=20)
         )

@@ -290,7 +290,7 @@ def test_what_is_wrong_is_named(server: Server) -> None:
             teleop.connect()
         with pytest.raises(ValueError, match=r"feedback \['force'\]: expected force_x"):
             teleop.send_feedback({"force": 1.0})
-        with pytest.raises(ValueError, match="not finite"):
+        with pytest.raises(ValueError, match="expected a finite number"):
             teleop.send_feedback({"force_x": float("nan")})
         assert teleop.is_calibrated and set(teleop.feedback_features) >= {"force_x", "contact_stiffness"}
         teleop.calibrate()
@@ -299,6 +299,35 @@ def test_what_is_wrong_is_named(server: Server) -> None:
     with pytest.raises(ConnectionError, match="nothing listens on 127.0.0.1:1"):
         wrong.connect()
     assert not wrong.is_connected
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("offset_y", float("nan")), ("buttons", -1), ("gripper_open_rad", 0.0), ("feedback_hold_s", -1.0),
+        ("max_force_N", -0.5), ("rate_Hz", -1.0), ("scale", "1"),
+    ],
+)  # fmt: skip
+def test_a_configuration_out_of_range_is_named_before_the_session(server: Server, name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=f"{name} {value!r}: expected "):
+        make(server, **{name: value})
+
+
+def test_feedback_that_is_wrong_acts_in_no_part(server: Server) -> None:
+    contact = {"contact_y": 0.0, "contact_stiffness": 500.0}  # its normal is missing
+    with make(server) as teleop, hapticd.connect(server.tcp) as other:
+        teleop.get_action()
+        for wrong, text in (
+            ({"force_z": 1.0, **contact}, "the normal 0, 0, 0"),
+            ({"force_z": "much"}, "force_z 'much': expected a finite number"),
+            ({"force_z": None}, "force_z None: expected a finite number"),
+        ):
+            with pytest.raises(ValueError, match=text):
+                teleop.send_feedback(wrong)
+        teleop._hand.wait_capabilities()
+        other.run_for(0.2)
+        assert abs(other.latest.force.force_N[2]) < 0.2
+        assert not teleop._force and not teleop._contact
 
 
 def test_a_demonstration_of_a_hundred_frames(server: Server) -> None:

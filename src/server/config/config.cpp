@@ -2,6 +2,7 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
+#include <cctype>
 #include <limits>
 #include <optional>
 #include <set>
@@ -37,6 +38,9 @@ class Reader {
   }
   void field(const std::string& key, std::string& out) {
     takeExact<std::string>(key, out, "a quoted string");
+    if (out.find('\0') != std::string::npos) {
+      fail(*find(key), key, "a quoted string without NUL characters");
+    }
   }
   void field(const std::string& key, std::vector<std::string>& out) {
     takeList(key, out, "a list of quoted strings");
@@ -240,6 +244,8 @@ toml::table tableOf(const std::string& text, const std::string& source) {
   } catch (const toml::parse_error& error) {
     std::ostringstream message;
     message << source << ":" << error.source().begin.line << ": " << error.description();
+    if (text.starts_with("vrpn_") || text.find("\nvrpn_") != std::string::npos)
+      message << "; a vrpn.cfg needs a name that ends with .cfg";
     throw ConfigError(message.str());
   }
 }
@@ -277,14 +283,21 @@ void check(const ServerConfig& config, const toml::table& root, const std::strin
 
 }  // namespace
 
+bool isVrpnCfg(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return extension == ".cfg";
+}
+
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings) {
   const std::string text = textOf(file);
-  if (file.extension() == ".cfg") return parseVrpnCfg(text, file.string(), warnings);
+  if (isVrpnCfg(file)) return parseVrpnCfg(text, file.string(), warnings);
   return parseConfig(text, file.string());
 }
 
 std::string placeOf(const InvalidValue& error, const std::filesystem::path& file) {
-  if (file.empty() || file.extension() == ".cfg") return "";
+  if (file.empty() || isVrpnCfg(file)) return "";
   const toml::table root = tableOf(textOf(file), file.string());
   return location(file.string(), nodeOf(error, root));
 }

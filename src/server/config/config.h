@@ -186,7 +186,10 @@ struct ServerConfig {
   bool operator==(const ServerConfig&) const = default;
 };
 
-/// Reads a TOML file, or a vrpn.cfg (extension .cfg), over the defaults. Throws ConfigError; an unknown key
+/// Whether a configuration file is a vrpn.cfg: by its extension .cfg, in letters of any case.
+bool isVrpnCfg(const std::filesystem::path& file);
+
+/// Reads a TOML file, or a vrpn.cfg, over the defaults. Throws ConfigError; an unknown key
 /// is an error that names the nearest known key. For each skipped line of a vrpn.cfg a text is appended to
 /// `warnings`.
 ServerConfig loadConfig(const std::filesystem::path& file, std::vector<std::string>& warnings);

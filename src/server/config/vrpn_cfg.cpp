@@ -128,8 +128,9 @@ ServerConfig parseVrpnCfg(const std::string& text, const std::string& source,
     }
   }
   if (config.devices.empty()) {
-    throw ConfigError(source +
-                      ": no line configures a device of this server; expected format: " + kOpenHaptics);
+    const std::string remedy =
+        warnings.empty() ? std::string("expected format: ") + kOpenHaptics : warnings.front();
+    throw ConfigError(source + ": no line configures a device of this server; " + remedy);
   }
   return config;
 }

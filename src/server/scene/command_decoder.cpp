@@ -1,7 +1,6 @@
 #include "server/scene/command_decoder.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "wire/dispatch.h"
 
@@ -107,9 +106,10 @@ scene::SceneCommand toCommand(const wire::MeshVertices& m) {
   return run;
 }
 
-// A negative vertex number becomes one that no mesh has, so that the scene refuses it by its number.
+// A negative vertex number becomes one that no mesh has, so that the scene refuses it, and prints it, by its
+// number.
 std::uint32_t corner(std::int32_t vertex) {
-  return vertex < 0 ? std::numeric_limits<std::uint32_t>::max() : static_cast<std::uint32_t>(vertex);
+  return static_cast<std::uint32_t>(vertex);
 }
 
 scene::SceneCommand toCommand(const wire::MeshTriangles& m) {

@@ -6,6 +6,7 @@
 
 #include "base/world.h"
 #include "net/local_socket.h"
+#include "server/config/config.h"
 #include "wire/frame_encoder.h"
 #include "wire/text.h"
 
@@ -386,7 +387,12 @@ void Session::onSender(std::string_view name) {
   }
   std::string devices;
   for (std::size_t i = 1; i < names_.senders().size(); ++i) devices += ' ' + names_.senders()[i];
-  logWarning("requested the device " + wire::inQuotes(name) + ", which does not exist; available:" + devices);
+  const bool isMirror = std::any_of(kMirrors.begin(), kMirrors.end(), [&](const auto& mirror) {
+    const std::string_view suffix = mirror.second;
+    return name.ends_with(suffix) && names_.findSender(name.substr(0, name.size() - suffix.size()));
+  });
+  logWarning("requested the device " + wire::inQuotes(name) + ", which does not exist; available:" + devices +
+             (isMirror ? "; 'mirrors = true' in its [[device]] offers it" : ""));
 }
 
 void Session::onUdp(const wire::UdpAddress& address) {

@@ -149,6 +149,14 @@ TEST(Config, InvalidValuesAreNamed) {
   EXPECT_NE(errorOf("http_allow = [\"lab7:\"]").find("\"lab7:\""), std::string::npos);
   EXPECT_NE(errorOf("http_allow = [\"lab7:99999\"]").find("\"lab7:99999\""), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nname=\"a\\nb\"").find("\"a\\x0ab\""), std::string::npos);
+  // The system would take the name of the file to end there.
+  for (const char* key : {"record", "socket", "tokens", "tls"}) {
+    EXPECT_EQ(errorOf(std::string(key) + " = \"/tmp/a\\u0000b\""),
+              std::string("test.toml:1: '") + key +
+                  "' is \"/tmp/a\\u0000b\", expected a quoted string without NUL characters");
+  }
+  EXPECT_EQ(errorOf("[[device]]\nblack_box_dir = \"a\\u0000b\""),
+            "test.toml:2: 'black_box_dir' is \"a\\u0000b\", expected a quoted string without NUL characters");
   EXPECT_NE(errorOf("[[device]]\nname=\"VRPN Control\"").find("'VRPN Control'"), std::string::npos);
   EXPECT_NE(errorOf("[[device]]\nworkspace=[-1e300,0,0,1,1,1]").find("-1e+300"), std::string::npos);
 }

@@ -122,6 +122,10 @@ TEST(VrpnCfg, AFileWithoutSupportedDevicesIsAnError) {
   EXPECT_NE(vrpnCfgError("# nothing\n")
                 .find("vrpn.cfg: no line configures a device of this server; expected format: vrpn_Open"),
             std::string::npos);
+  EXPECT_EQ(
+      vrpnCfgError("# a misspelt line\nvrpn_phantom P 1 60 X\nvrpn_Tracker_NULL T 2 60\n"),
+      "vrpn.cfg: no line configures a device of this server; vrpn.cfg:2: \"vrpn_phantom\" is not supported "
+      "by this server (supported: vrpn_OpenHaptics, vrpn_Phantom): skipped");
 }
 
 TEST(VrpnCfg, WrittenAsTomlItReadsBackEqual) {
@@ -141,6 +145,16 @@ TEST(VrpnCfg, TheFileExtensionSelectsTheFormat) {
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("vrpn.cfg:1: \"vrpn_Dial\""), std::string::npos) << warnings[0];
   EXPECT_EQ(loadConfig(directory / "hapticd.toml", warnings).port, 4000);
+  std::ofstream(directory / "VRPN.CFG") << "vrpn_Phantom Q 1 60 X\n";
+  EXPECT_EQ(loadConfig(directory / "VRPN.CFG", warnings).devices.at(0).names.front(), "Q");
+  std::ofstream(directory / "vrpn.txt") << "# of the laboratory\nvrpn_Phantom P 1 60 X\n";
+  try {
+    loadConfig(directory / "vrpn.txt", warnings);
+    ADD_FAILURE();
+  } catch (const ConfigError& error) {
+    EXPECT_TRUE(std::string(error.what()).ends_with("; a vrpn.cfg needs a name that ends with .cfg"))
+        << error.what();
+  }
   EXPECT_THROW(loadConfig(directory / "none.toml", warnings), ConfigError);
   std::filesystem::remove_all(directory);
 }

@@ -1,0 +1,182 @@
+"""Wrong arguments: each is a ValueError that names the value, sends nothing, and leaves the client as it was."""
+
+import asyncio
+import re
+from typing import Any, Callable, Iterator, List, Tuple
+
+import numpy as np
+import pytest
+
+import hapticd
+
+from conftest import COMMANDS, Server
+
+
+class Wrong:
+    """A value that no argument takes."""
+
+    def __repr__(self) -> str:
+        return "Wrong()"
+
+
+WRONG = Wrong()
+
+
+def wrong_ones(value: Any) -> Iterator[Any]:
+    """An argument with each of its parts replaced by a wrong one, and the whole of it."""
+    yield WRONG
+    if isinstance(value, (tuple, list)):
+        for at, part in enumerate(value):
+            for wrong in wrong_ones(part):
+                parts = [*value[:at], wrong, *value[at + 1 :]]
+                yield type(value)(*parts) if hasattr(value, "_fields") else parts
+    elif isinstance(value, np.ndarray):
+        yield from wrong_ones(value.tolist())
+
+
+def cases() -> Iterator[Tuple[str, List[Any]]]:
+    contact = hapticd.RemoteContact(1, (0, 0, 0), (0, 0, 1))
+    for call, arguments in {**COMMANDS, "set_remote_contacts": ([contact],)}.items():
+        for at, argument in enumerate(arguments):
+            for wrong in wrong_ones(argument):
+                if call == "update_mesh" and isinstance(wrong, hapticd.Surface) and WRONG in wrong[4:]:
+                    continue  # popthrough and mass are not sent
+                yield call, [*arguments[:at], wrong, *arguments[at + 1 :]]
+
+
+def check(error: "pytest.ExceptionInfo[ValueError]") -> None:
+    assert re.search(r"Wrong\(\).*(expected|give) ", str(error.value)), error.value
+
+
+@pytest.fixture(scope="module")
+def hand() -> Iterator[hapticd.Client]:
+    server = Server()
+    with hapticd.connect(server.tcp) as client:
+        client.wait_capabilities()
+        yield client
+    server.stop()
+
+
+@pytest.mark.parametrize("call", sorted(call for call, arguments in COMMANDS.items() if arguments))
+def test_wrong_arguments_are_named_and_nothing_is_sent(hand: hapticd.Client, call: str) -> None:
+    for _, arguments in (case for case in cases() if case[0] == call):
+        sent = hand.statistics().messages_out
+        with pytest.raises(ValueError) as error:
+            getattr(hand, call)(*arguments)
+        check(error)
+        assert hand.statistics().messages_out == sent, arguments
+
+
+def test_the_same_in_asyncio(hand: hapticd.Client) -> None:
+    async def run() -> None:
+        async with hapticd.aio.connect(f"Phantom@tcp://{hand.server}") as other:
+            await other.wait_capabilities()
+            for call, arguments in cases():
+                sent = other.statistics().messages_out
+                with pytest.raises(ValueError) as error:
+                    await asyncio.ensure_future(_result(getattr(other, call), arguments))
+                check(error)
+                assert other.statistics().messages_out == sent, (call, arguments)
+            for wait in (other.poll, other.wait_connected):
+                with pytest.raises(ValueError, match="nan: give a time in seconds"):
+                    await wait(float("nan"))
+            with pytest.raises(ValueError, match="nan: give a time in seconds"):
+                await other.collect("force", float("nan"))
+
+    asyncio.run(run())
+
+
+async def _result(call: Callable[..., Any], arguments: List[Any]) -> None:
+    result = call(*arguments)
+    if result is not None:
+        await result
+
+
+def test_fields_of_values_are_checked_one_by_one(hand: hapticd.Client) -> None:
+    for call in ("set_surface", "update_mesh"):
+        with pytest.raises(ValueError, match=r"^\(0.5, 0.1\): give a hapticd.Surface$"):
+            getattr(hand, call)(0, (0.5, 0.1))
+    with pytest.raises(ValueError, match=r"object is 1.5, expected an integer from -2147483648 to 2147483647$"):
+        hand.clear_mesh(1.5)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"buttons is -1, expected an integer from 0 to 4294967295$"):
+        hand.hold_hand((0, 0, 0), buttons=-1)
+    with pytest.raises(ValueError, match="parameters has array.*, expected a number"):
+        hand.start_custom_effect(0, np.ones((2, 3)))
+    with pytest.raises(ValueError, match="kinds is 'tick', expected an integer"):
+        hand.subscribe("tick")  # type: ignore[arg-type]
+
+
+def test_meshes_of_what_is_no_number_are_refused(hand: hapticd.Client) -> None:
+    vertices, triangles = hapticd.sphere(20)
+    for wrong, text in (
+        (vertices + 1j, "vertices of type complex64: give"),
+        (vertices.astype(str), "vertices of type <U.*: give"),
+        (vertices.astype("i8").astype("M8[s]"), "vertices of type datetime64.*: give"),
+        (np.zeros(5, dtype=[("x", "f4"), ("y", "f4"), ("z", "f4")]), "vertices of type .*: give"),
+        (np.ma.masked_array(vertices, mask=vertices > 10), "vertices with masked values: give"),
+        ([[1, 2, 3], [4, 5]], r"vertices \[\[1, 2, 3\], \[4, 5\]\]: give \(n, 3\) numbers"),
+        ((row for row in vertices), "vertices <generator .*>: give"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            hand.upload_mesh(0, wrong, triangles)  # type: ignore[arg-type]
+    numbers = np.where(triangles == 0, 9999, triangles)
+    for wrong, text in (
+        (np.ma.masked_array(numbers, mask=numbers == 9999), "triangles with masked values: give"),
+        ([[0, 1, 2], [1, 2]], r"triangles \[\[0, 1, 2\], \[1, 2\]\]: give \(m, 3\) integers"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            hand.upload_mesh(0, vertices, wrong)
+
+
+def test_what_is_numbers_is_taken(hand: hapticd.Client) -> None:
+    vertices, triangles = hapticd.sphere(20)
+    expected = hand._mesh_frames(0, np.asarray(vertices, ">f4"), np.asarray(triangles, ">i4"))[1]
+    for one in (
+        vertices.astype(">f8"), vertices.astype(object), vertices[::-1][::-1], np.asfortranarray(vertices),
+        np.hstack([vertices, vertices])[:, :3], vertices.tolist(), np.ma.masked_array(vertices),
+    ):  # fmt: skip
+        sent = hand.statistics().messages_out
+        hand.upload_mesh(0, one, triangles)
+        assert hand.statistics().messages_out == sent + expected
+    for touchable in (True, 0, np.bool_(False), np.True_):
+        hand.set_touchable(0, touchable)  # type: ignore[arg-type]
+    hand.set_object_count(np.int64(1))  # type: ignore[arg-type]
+    hand.set_vertex(0, 0, np.float32(1), 2, np.float64(3))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), None, "1", 1j])
+def test_a_time_that_is_none_is_refused(hand: hapticd.Client, seconds: Any) -> None:
+    text = re.escape(f"{seconds!r}: give a time in seconds")
+    for wait in (hand.poll, hand.run_for, hand.wait_connected):
+        with pytest.raises(ValueError, match=text):
+            wait(seconds)
+    for read in (hand.reports, hand.rows, hand.collect):
+        with pytest.raises(ValueError, match=text):
+            list(read("force", seconds))
+
+
+def test_callbacks_and_kinds_that_are_none_are_refused(hand: hapticd.Client) -> None:
+    with pytest.raises(ValueError, match="Wrong.*: give a function that takes one report"):
+        hand.on_force(WRONG)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"no reports of kind \[\]; there are pose"):
+        hand.on([], print)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [-1, float("nan"), None, "3"])
+def test_options_out_of_range_are_refused(value: Any) -> None:
+    for name in ("connect_timeout", "send_timeout", "queue_limit_bytes"):
+        with pytest.raises(ValueError, match=f"{name} is {value!r}: give a number of at least 0"):
+            hapticd.connect("Phantom@localhost", **{name: value})
+    with pytest.raises(ValueError, match="3.0: give a hapticd.Options"):
+        hapticd.connect("Phantom@localhost", 3.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("device", [None, 7, b"Phantom@localhost", "Phan\0tom@localhost"])
+def test_a_device_that_is_no_text_is_refused(device: Any) -> None:
+    with pytest.raises(ValueError, match="expected NAME@host"):
+        hapticd.connect(device)
+
+
+def test_a_host_that_cannot_be_is_an_unknown_host() -> None:
+    with pytest.raises(hapticd.ConnectError, match="no server at .:3883"):
+        hapticd.connect("Phantom@tcp://.")
