@@ -37,7 +37,7 @@ template <Is<scene::SceneConfig> T, class V>
 void fields(T& config, V&& v) {
   auto& [materialScale, workspaceFit, contactVibrationUnit, motorVibrationFrame, deviceWorkspace_m,
          nominalStiffness_N_per_m, nominalForce_N, ownDamping_Ns_per_m, servoPeriod_s, transportDelay_s, raw,
-         checkMeshes, limits, ballTool, stopwatch, owners] = config;
+         checkMeshes, limits, ballTool, stopwatch, clock, owners] = config;
   v("material_scale", materialScale);
   v("workspace_fit", workspaceFit);
   v("contact_vibration_unit", contactVibrationUnit);
@@ -53,6 +53,7 @@ void fields(T& config, V&& v) {
   v("limits", limits);
   static_cast<void>(ballTool);
   static_cast<void>(stopwatch);  // its readings are in the publish events
+  static_cast<void>(clock);      // and so are these
   static_cast<void>(owners);
 }
 

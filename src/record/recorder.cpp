@@ -36,13 +36,6 @@ std::uint32_t Recorder::addDevice(RecordedDevice device) {
   return static_cast<std::uint32_t>(devices_.size() - 1);
 }
 
-std::function<Nanos()> Recorder::stopwatch(std::uint32_t device) {
-  return [readings = &devices_[device]->readings] {
-    readings->push_back(base::now());
-    return readings->back();
-  };
-}
-
 void Recorder::start(Nanos wallOffset, std::string config) {
   wallOffset_ = wallOffset;
   measuredWall_ = base::wallNow() - base::now();
@@ -117,11 +110,10 @@ void Recorder::recordLeft(std::uint32_t scene, scene::ClientId client, Nanos tim
   appendEvent(BlockKind::left, std::move(content));
 }
 
-void Recorder::recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision) {
-  PublishEvent event{device, time, revision, {}};
-  event.stopwatch.swap(devices_[device]->readings);
+void Recorder::recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision,
+                             const std::vector<Nanos>& readings) {
   Bytes content;
-  Packer(content).put(event);
+  Packer(content).put(PublishEvent{device, time, revision, readings});
   appendEvent(BlockKind::publish, std::move(content));
 }
 

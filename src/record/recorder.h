@@ -70,9 +70,6 @@ class Recorder {
   realtime::StreamRing& streamRing(std::uint32_t device) { return devices_[device]->streams; }
   /// The same for what a servo knows, of a recording that begins while it runs.
   realtime::MemoryRing& memoryRing(std::uint32_t device) { return devices_[device]->memories; }
-  /// For SceneConfig::stopwatch of a device: keeps its readings for the next recordPublish() of the device.
-  /// The scene thread calls it.
-  std::function<Nanos()> stopwatch(std::uint32_t device);
   /// Writes the header and starts the thread. Throws RecordingError, with the remedy, when the file does not
   /// take the header; it is removed then.
   void start(Nanos wallOffset, std::string config);
@@ -84,7 +81,8 @@ class Recorder {
                      const scene::SceneCommand* command);
   /// After publish() of the device's builder, before its servo can see the snapshot. Revision 0: nothing had
   /// changed.
-  void recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision);
+  void recordPublish(std::uint32_t device, Nanos time, std::uint64_t revision,
+                     const std::vector<Nanos>& readings = {});
 
   /// From any thread, before a servo can see it: the forces of a client must end from this time on; 0: what
   /// it commands from here on is felt again.
@@ -112,8 +110,7 @@ class Recorder {
     realtime::RecordRing ring;
     realtime::StreamRing streams;
     realtime::MemoryRing memories{2};
-    std::vector<Nanos> readings;  // of the stopwatch; scene thread
-    TickPacker packer;            // from here on: recorder thread
+    TickPacker packer;  // from here on: recorder thread
     Bytes run;
     std::uint64_t lost = 0;
     std::uint64_t lostStreamed = 0;

@@ -57,7 +57,11 @@ struct SceneConfig {
   bool ballTool = true;
 
   /// Measures how long building takes, so that it takes at most a quarter of the thread; empty: steady clock.
+  /// What is built when follows from it: the builders of a scene that several devices share get the same
+  /// readings.
   std::function<base::Nanos()> stopwatch;
+  /// When a build has ended, on the same scale: its shape travels from then on; empty: the stopwatch.
+  std::function<base::Nanos()> clock;
 
   /// Tells the servo which clients are gone; null: it learns so from snapshots only. Shared by all builders
   /// of a scene.

@@ -78,7 +78,8 @@ std::optional<Nanos> ObjectTable::nextDeadline() const {
 void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   if (edited_.empty()) return;
   const Nanos started = stopwatch_();
-  const auto clock = [&] { return now + (stopwatch_() - started); };
+  const auto worked = [&] { return now + (stopwatch_() - started); };
+  const auto present = [&] { return now + (clock_() - started); };
   std::vector<std::int32_t> later;
   std::vector<Object*> committed;
   committed.reserve(edited_.size());
@@ -87,25 +88,25 @@ void ObjectTable::commitMeshes(Nanos now, NoticeBoard& board, std::vector<Notice
     if (object == nullptr) continue;
     const std::optional<Nanos> due = object->mesh.due();
     const bool rebuild = object->mesh.hasBeenPublished() && !object->mesh.finished();
-    if (due && (*due > now || (rebuild && clock() < rebuildNotBefore_))) {
+    if (due && (*due > now || (rebuild && worked() < rebuildNotBefore_))) {
       later.push_back(id);
       continue;
     }
     object->meshQueued = false;
     if (!due) continue;
-    const Nanos begin = clock();
+    const Nanos begin = worked();
     try {
-      commitMesh(*object, now, clock(), committed);
+      commitMesh(*object, now, present(), committed);
     } catch (const std::exception& error) {
       object->mesh.giveUp();
       const Call call{object->meshSetBy, now, false, board, out};
       call.refuse("mesh", "could not be built, the previous one stays", " of object ", id, ", ",
                   error.what());
     }
-    if (rebuild) rebuildNotBefore_ = clock() + 3 * (clock() - begin);
+    if (rebuild) rebuildNotBefore_ = worked() + 3 * (worked() - begin);
   }
   edited_ = std::move(later);
-  beginMorphs(committed, clock());
+  beginMorphs(committed, present());
 }
 
 // Meshes that a client deforms together arrive together: no seam between them opens on the way.

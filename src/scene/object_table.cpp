@@ -41,6 +41,7 @@ ObjectTable::ObjectTable(const SceneConfig& config)
     : config_(config),
       bound_(config),
       stopwatch_(config.stopwatch ? config.stopwatch : base::now),
+      clock_(config.clock ? config.clock : stopwatch_),
       checks_(stopwatch_) {
   create(0, Object::kScene);
 }

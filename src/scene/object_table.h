@@ -195,6 +195,7 @@ class ObjectTable {
   const SceneConfig& config_;
   PassivityBound bound_;
   std::function<Nanos()> stopwatch_;
+  std::function<Nanos()> clock_;
   std::vector<std::unique_ptr<Object>> objects_;
   Affine T_world_scene_ = Affine::Identity();
   LastCommands asked_;  // of the scene's origin

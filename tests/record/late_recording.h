@@ -81,7 +81,8 @@ class LateRecording {
       afterEach();
     }
   }
-  /// Until a recording begins, the scene takes so long from one reading of its stopwatch to the next.
+  /// Until a recording begins, the scene takes so long from one reading of its stopwatch to the next;
+  /// otherwise a microsecond.
   void slowDown(base::Nanos reading) { reading_ = reading; }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
@@ -108,7 +109,6 @@ class LateRecording {
         file, [](record::RecorderProblem, const std::string& text) { ADD_FAILURE() << text; }, options);
     recorder->addDevice(device_);
     recorder->start(0, "");
-    stopwatch_ = recorder->stopwatch(0);
     owners_->watch([r = recorder.get()](scene::ClientId client, std::optional<base::Nanos> left) {
       r->recordLeft(0, client, left.value_or(0));
     });
@@ -127,7 +127,6 @@ class LateRecording {
   void end() {
     tick_.recordTo({});
     owners_->watch(nullptr);
-    stopwatch_ = nullptr;
     recorder_->finish();
     recorder_.reset();
   }
@@ -178,7 +177,7 @@ class LateRecording {
 
   scene::SceneConfig withStopwatch() {
     scene::SceneConfig config = device_.sceneConfig;
-    config.stopwatch = [this] { return stopwatch_ ? stopwatch_() : slow_ += reading_; };
+    config.stopwatch = [this] { return readings_.emplace_back(stopwatch_ += recorder_ ? 1000 : reading_); };
     config.owners = owners_;
     return config;
   }
@@ -187,8 +186,9 @@ class LateRecording {
     now_ += kTick;
     const auto due = builder_.nextDeadline();
     if (std::exchange(changed_, false) || (due && *due <= now_)) {
+      readings_.clear();
       const auto snapshot = builder_.publish(now_, notices_);
-      if (recorder_) recorder_->recordPublish(0, now_, snapshot ? snapshot->revision : 0);
+      if (recorder_) recorder_->recordPublish(0, now_, snapshot ? snapshot->revision : 0, readings_);
       if (const auto shown = unshown_ ? builder_.revisionWith(*unshown_) : std::nullopt) {
         tick_.rememberFrom(*shown);
         unshown_.reset();
@@ -201,9 +201,9 @@ class LateRecording {
 
   const record::RecordedDevice device_ = describedDevice();
   base::Nanos now_ = 1'000'000'000;
-  std::function<base::Nanos()> stopwatch_;
-  base::Nanos reading_ = 0;
-  base::Nanos slow_ = 0;
+  std::vector<base::Nanos> readings_;  // of the stopwatch, in the publication at hand
+  base::Nanos reading_ = 1000;
+  base::Nanos stopwatch_ = 0;
   std::vector<scene::Notice> notices_;
   bool changed_ = false;
   std::optional<base::Nanos> unshown_;  // the begin of a recording, until all edits before it are published

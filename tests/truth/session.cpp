@@ -95,7 +95,7 @@ bool writeSession(const Trial& trial, const std::filesystem::path& file) {
       {.ticks = trial.hips.size() + 1});
   record::RecordedDevice device = deviceOf(trial);
   recorder.addDevice(device);
-  device.sceneConfig.stopwatch = recorder.stopwatch(0);
+  device.sceneConfig.stopwatch = [] { return base::Nanos{0}; };
   scene::SceneBuilder builder(device.sceneConfig);
   TrialHand hand(trial);
   base::SimulatedClock clock;

@@ -29,8 +29,10 @@ void lowerTo(std::optional<base::Nanos>& next, std::optional<base::Nanos> at) {
 }  // namespace
 
 SceneThread::SceneThread(std::vector<SceneDevice> devices, Callbacks callbacks)
-    : callbacks_(std::move(callbacks)) {
+    : stopwatch_(devices.size()), callbacks_(std::move(callbacks)) {
   for (SceneDevice& device : devices) {
+    device.config.stopwatch = [this] { return stopwatch_.read(); };
+    device.config.clock = [this] { return stopwatch_.readClock(); };
     scene::SceneBuilder builder(device.config);
     seats_.push_back({std::move(device), std::move(builder)});
   }
@@ -172,9 +174,11 @@ void SceneThread::callPublishWaiters(std::optional<base::Nanos> oldestEdit) {
 
 void SceneThread::publish() {
   collectAt_.reset();
+  const base::Nanos now = base::now();
+  stopwatch_.beginRound();
   for (Seat& seat : seats_) {
     try {
-      publishTo(seat);
+      publishTo(seat, now);
     } catch (const std::exception& error) {
       // Out of memory, or the index could not be built: the servo keeps the previous snapshot.
       spdlog::error("the scene could not be published: {}", error.what());
@@ -207,19 +211,20 @@ void SceneThread::inspect() {
   }
 }
 
-void SceneThread::publishTo(Seat& seat) {
+void SceneThread::publishTo(Seat& seat, base::Nanos now) {
   std::vector<scene::Notice> notices;
-  const base::Nanos now = base::now();
   std::shared_ptr<const scene::SceneSnapshot> snapshot;
   // First, so that the builder can refit the index that the servo returned instead of building a new one.
   seat.device.slot->collect();
+  stopwatch_.beginBuilder();
   try {
     snapshot = seat.builder.publish(now, notices);
   } catch (...) {
-    if (seat.device.publishing) seat.device.publishing(now, 0);
+    if (seat.device.publishing) seat.device.publishing(now, 0, stopwatch_.given());
     throw;
   }
-  if (seat.device.publishing) seat.device.publishing(now, snapshot ? snapshot->revision : 0);
+  if (seat.device.publishing)
+    seat.device.publishing(now, snapshot ? snapshot->revision : 0, stopwatch_.given());
   mergeNotices(std::move(notices), notices_);
   if (!snapshot) return;
   seat.device.slot->publish(snapshot);

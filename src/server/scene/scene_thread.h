@@ -11,6 +11,7 @@
 #include "scene/builder.h"
 #include "scene/snapshot_slot.h"
 #include "server/scene/scene_queue.h"
+#include "server/scene/shared_stopwatch.h"
 
 namespace hapticd::server {
 
@@ -21,8 +22,8 @@ struct SceneDevice {
   /// Scene thread; called after the snapshot was passed to the slot.
   std::function<void(const std::shared_ptr<const scene::SceneSnapshot>&)> published;
   /// Scene thread; called before a snapshot is passed to the slot, with the time at which the builder was
-  /// asked and the revision that it returned, 0 for none. May be empty.
-  std::function<void(base::Nanos, std::uint64_t)> publishing;
+  /// asked, the revision that it returned, 0 for none, and its readings of stopwatch and clock. May be empty.
+  std::function<void(base::Nanos, std::uint64_t, const std::vector<base::Nanos>&)> publishing;
 };
 
 /// Owns one scene and its thread: one builder for each device, because workspace and passivity bound differ;
@@ -76,13 +77,14 @@ class SceneThread {
   void apply(SceneTask&& task);
   void noteFailure(scene::ClientId client, const char* reason) noexcept;
   void publish();
-  void publishTo(Seat& seat);
+  void publishTo(Seat& seat, base::Nanos now);
   void describeScene();
   void inspect();
   std::optional<base::Nanos> oldestEdit() const;
   void callPublishWaiters(std::optional<base::Nanos> oldestEdit);
   std::optional<base::Nanos> nextDeadline() const;
 
+  SharedStopwatch stopwatch_;
   std::vector<Seat> seats_;
   Callbacks callbacks_;
   std::vector<scene::Notice> notices_;

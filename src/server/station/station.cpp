@@ -135,15 +135,14 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                                 impl.onPublished(snapshot);
                               },
                           .publishing =
-                              [&impl](base::Nanos now, std::uint64_t revision) {
+                              [&impl](base::Nanos now, std::uint64_t revision, const auto& readings) {
                                 if (impl.recording == nullptr) return;
-                                impl.recording->recordPublish(impl.recordedAs, now, revision);
+                                impl.recording->recordPublish(impl.recordedAs, now, revision, readings);
                                 impl.showEdits();
                               }};
   sceneDevice.config.limits = sceneLimits(scene.limits());
   impl.recordedScene = sceneDevice.config;
   impl.recordedOptions = tickOptions(impl.config, *impl.device);
-  sceneDevice.config.stopwatch = [&impl] { return impl.stopwatch ? impl.stopwatch() : base::now(); };
   scene.add(std::move(sceneDevice));
 }
 
@@ -179,7 +178,6 @@ void Station::recordTo(record::Recorder* recording, std::uint32_t number,
   Impl& impl = *impl_;
   impl.recording = recording;
   impl.recordedAs = number;
-  impl.stopwatch = recording != nullptr ? recording->stopwatch(number) : nullptr;
   realtime::Tick::Rings rings;
   if (recording != nullptr) {
     rings.ticks = &recording->ring(number);

@@ -137,7 +137,6 @@ struct Station::Impl {
   // Of a recording that began at this time, until the scene shows all edits up to it; null: it does.
   const scene::SceneBuilder* unshown = nullptr;
   base::Nanos begunAt = 0;
-  std::function<base::Nanos()> stopwatch;  // of the recording; empty: the clock
 
   // Scene thread: object ids and topologies for which the scripted hand was planned.
   std::vector<std::pair<std::int32_t, std::uint64_t>> plannedFor{{-1, 0}};
