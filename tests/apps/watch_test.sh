@@ -5,15 +5,21 @@ hapticd=$1
 source_dir=$2
 . "$(dirname "$0")/server.sh"
 
-"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 8 >"$work/touch" &
+"$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@$address" --seconds 120 >"$work/touch" &
 touch=$!
-"$hapticd" watch "Phantom@$address" --csv --rate 200 --seconds 6 >"$work/csv"
+# Every row has every column, and tick numbers increase. There is a force as soon as the hand has planned a stroke.
+force=""
+for _ in $(seq 10); do
+  "$hapticd" watch "Phantom@$address" --csv --rate 200 --seconds 6 >"$work/csv"
+  force=$(awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) c[$i] = i; next }
+                   NF != columns || $c["tick"] <= tick { print "row " NR ": " $0; bad = 1; exit }
+                   { tick = $c["tick"] } $c["force_x_N"]^2 + $c["force_y_N"]^2 + $c["force_z_N"]^2 > 0.01 { force = 1 }
+                   END { if (!bad && force && NR >= 100) print "felt"; exit bad }' "$work/csv") || { echo "$force"; exit 1; }
+  [ "$force" != felt ] || break
+done
+[ "$force" = felt ] || { tail -3 "$work/csv"; exit 1; }
+kill "$touch"
 wait "$touch"
-# Every row has every column, tick numbers increase, and there is a force.
-awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) c[$i] = i; next }
-         NF != columns || $c["tick"] <= tick { print "row " NR ": " $0; bad = 1; exit }
-         { tick = $c["tick"] } $c["force_x_N"]^2 + $c["force_y_N"]^2 + $c["force_z_N"]^2 > 0.01 { force = 1 }
-         END { exit bad || !force || NR < 100 }' "$work/csv" || { tail -3 "$work/csv"; exit 1; }
 
 "$hapticd" watch "Phantom@tcp://$address" --json --seconds 1 >"$work/json"
 grep -qE '^\{"device":"Phantom","time_ns":"[0-9]{19}","tick":[0-9]+,.*"force_N":\[[^]]*\],.*\}$' "$work/json"
