@@ -394,7 +394,8 @@ struct ContinueMesh {
   static constexpr CommandInfo kInfo{"ContinueMesh", kNoMessage,    Target::objects,
                                      "object",       "hasDeformed", "edited_ns"};
   std::int32_t object = 0;
-  std::int32_t hasDeformed = 0;  ///< 1: vertices have moved since its triangles were set
+  /// 1: vertices have moved since its triangles were set; 2: others were published before these.
+  std::int32_t hasDeformed = 0;
   std::int64_t edited_ns = -1;  ///< so long ago the first edit began that is not published; -1: there is none
 };
 
@@ -405,15 +406,27 @@ struct PauseRebuilds {
   std::int64_t pause_ns = 0;
 };
 
+/// The check of the mesh of an object is due in this time; the first one, with object -1, replaces those that
+/// the commands of the scene have begun. Recordings that begin while the server runs have it.
+struct ContinueCheck {
+  static constexpr CommandInfo kInfo{"ContinueCheck", kNoMessage,  Target::objects,
+                                     "object",        "isCurrent", "due_ns"};
+  std::int32_t object = -1;
+  std::int32_t isCurrent = 0;  ///< 0: the mesh has changed since; nothing is left to check
+  std::int64_t due_ns = 0;
+};
+
 /// Recordings store the position in this list as the number of a command: append, never reorder or remove.
-using CommandVariant = std::variant<
-    SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh, TransformMesh,
-    SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject, SetTransform, SetObjectPosition,
-    SetObjectOrientation, SetObjectScale, SetTouchable, SetSurfaceProperty, SetSurface, SetTouchableFaces,
-    SetWorkspaceProjection, SetWorkspaceBox, SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect,
-    StartEffect, StopEffect, SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
-    SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene, BeginBatch,
-    CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch, ContinueMesh, PauseRebuilds>;
+using CommandVariant =
+    std::variant<SetObjectNumber, SetVertices, SetTriangles, SetNormal, RemoveTriangle, ClearMesh,
+                 TransformMesh, SetTrimeshType, AddObject, AddObjectExScene, MoveToParent, RemoveObject,
+                 SetTransform, SetObjectPosition, SetObjectOrientation, SetObjectScale, SetTouchable,
+                 SetSurfaceProperty, SetSurface, SetTouchableFaces, SetWorkspaceProjection, SetWorkspaceBox,
+                 SetHapticOrigin, SetHapticScale, SetSceneOrigin, DefineEffect, StartEffect, StopEffect,
+                 SetPlane, SetPlaneDetail, SetForceField, SetConstraintEnabled, SetConstraintMode,
+                 SetConstraintVector, SetConstraintStiffness, StartCustomEffect, StopCustomEffect, ResetScene,
+                 BeginBatch, CommitBatch, ReleaseForces, SetObjectName, ContinueEffect, RefuseBatch,
+                 ContinueMesh, PauseRebuilds, ContinueCheck>;
 
 /// Any one command; std::visit, std::get and their like work on it. Copying, moving and destroying are
 /// compiled once, in commands.cpp: a variant of so many structs costs every file that holds one several

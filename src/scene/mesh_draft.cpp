@@ -171,7 +171,8 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
     });
     for (const std::int32_t triangle : removed) add(RemoveTriangle{object, triangle});
   }
-  if (edited || hasDeformed_) add(ContinueMesh{object, hasDeformed_, edited ? lastEdit_ - firstEdit_ : -1});
+  const std::int32_t past = hasDeformed_ ? 1 : edited && hasBeenPublished() ? 2 : 0;
+  if (edited || hasDeformed_) add(ContinueMesh{object, past, edited ? lastEdit_ - firstEdit_ : -1});
 }
 
 void MeshDraft::appendEditsUnderWay(std::int32_t object, ClientId client,
@@ -183,8 +184,9 @@ void MeshDraft::appendEditsUnderWay(std::int32_t object, ClientId client,
   out.push_back({client, ContinueMesh{object, hasDeformed_, lastEdit_ - firstEdit_}, lastEdit_});
 }
 
-void MeshDraft::continueFrom(bool hasDeformed, std::optional<Nanos> firstEdit, Nanos now) {
+void MeshDraft::continueFrom(bool hasDeformed, bool wasPublished, std::optional<Nanos> firstEdit, Nanos now) {
   hasDeformed_ = hasDeformed;
+  wasPublished_ = wasPublished;
   if (!firstEdit) return;
   edited(now);
   firstEdit_ = *firstEdit;
@@ -247,6 +249,7 @@ std::shared_ptr<const MeshGeometry> MeshDraft::commit(Nanos now, std::uint64_t t
   dirty_ = false;
   shapeChanged_ = false;
   finished_ = false;
+  wasPublished_ = false;
   return current_;
 }
 

@@ -83,14 +83,14 @@ class MeshDraft {
   /// Appends the commands, with their times, that make the published draft this one.
   void appendEditsUnderWay(std::int32_t object, ClientId client, std::vector<ClientCommand>& out) const;
   /// What ContinueMesh says.
-  void continueFrom(bool hasDeformed, std::optional<Nanos> firstEdit, Nanos now);
+  void continueFrom(bool hasDeformed, bool wasPublished, std::optional<Nanos> firstEdit, Nanos now);
 
   bool finished() const { return finished_; }
   /// When edits should be published; nothing when there are none.
   std::optional<Nanos> due() const;
   /// The oldest edit that is not published yet; nothing when there is none.
   std::optional<Nanos> oldestEdit() const { return dirty_ ? std::optional(firstEdit_) : std::nullopt; }
-  bool hasBeenPublished() const { return current_ != nullptr; }
+  bool hasBeenPublished() const { return current_ != nullptr || wasPublished_; }
 
   /// Builds the mesh with all edits; null when it has no triangles. `topology` numbers a new list of
   /// triangles; no other mesh has it. begin() must follow.
@@ -116,7 +116,8 @@ class MeshDraft {
   bool dirty_ = false;
   bool shapeChanged_ = false;  // more than positions
   bool finished_ = false;
-  bool hasDeformed_ = false;  // since the triangles were set
+  bool hasDeformed_ = false;   // since the triangles were set
+  bool wasPublished_ = false;  // with other triangles, before the recording that this draft continues
   Nanos firstEdit_ = 0;
   Nanos lastEdit_ = 0;
   Nanos lastCommit_ = 0;

@@ -48,6 +48,13 @@ void MeshChecks::add(std::int32_t object, std::uint64_t topology, Nanos now) {
   pending_.push_back({now + kCheckAfter, object, topology});
 }
 
+std::vector<MeshChecks::Pending> MeshChecks::waiting() const {
+  std::vector<Pending> all;
+  if (search_) all.push_back({0, search_->object, search_->topology});
+  all.insert(all.end(), pending_.begin(), pending_.end());
+  return all;
+}
+
 std::optional<Nanos> MeshChecks::due() const {
   if (search_) return 0;
   if (pending_.empty()) return std::nullopt;

@@ -32,23 +32,29 @@ class MeshChecks {
   /// Takes the sentences about an object's mesh.
   using Report = std::function<void(std::int32_t object, const std::string& text)>;
 
+  /// A mesh that waits for its check.
+  struct Pending {
+    Nanos at = 0;
+    std::int32_t object = 0;
+    std::uint64_t topology = 0;
+  };
+
   explicit MeshChecks(Stopwatch stopwatch) : stopwatch_(std::move(stopwatch)) {}
 
   void clear();
   /// A shape has come: it is due after it has been left alone for a while, so that half an upload is not
   /// called open.
   void add(std::int32_t object, std::uint64_t topology, Nanos now);
+  /// After those that wait already.
+  void wait(const Pending& check) { pending_.push_back(check); }
+  /// Those that wait, by time; first the one that is being searched, which is due at once.
+  std::vector<Pending> waiting() const;
   /// When there is something to do; nothing when not.
   std::optional<Nanos> due() const;
   /// Goes on with what is due at `now`; returns the time it took.
   Nanos run(Nanos now, const Find& find, const Report& report);
 
  private:
-  struct Pending {
-    Nanos at = 0;
-    std::int32_t object = 0;
-    std::uint64_t topology = 0;
-  };
   struct Search {
     std::int32_t object = 0;
     std::uint64_t topology = 0;

@@ -144,13 +144,22 @@ void ObjectTable::handle(ContinueMesh& c, const Call& call) {
   if (object == nullptr) return;
   std::optional<Nanos> firstEdit;
   if (c.edited_ns >= 0) firstEdit = call.now - std::min<Nanos>(c.edited_ns, MeshDraft::kLongest);
-  object->mesh.continueFrom(c.hasDeformed != 0, firstEdit, call.now);
+  object->mesh.continueFrom(c.hasDeformed == 1, c.hasDeformed == 2, firstEdit, call.now);
   if (firstEdit) meshEdited(*object, call);
 }
 
 template <>
 void ObjectTable::handle(PauseRebuilds& c, const Call& call) {
   rebuildNotBefore_ = call.now + std::clamp<Nanos>(c.pause_ns, 0, kLongestPause);
+}
+
+template <>
+void ObjectTable::handle(ContinueCheck& c, const Call& call) {
+  if (c.object < 0) return checks_.clear();
+  const Object* object = find(c.object);
+  const bool present = object != nullptr && object->geometry && c.isCurrent != 0;
+  checks_.wait({call.now + std::clamp<Nanos>(c.due_ns, 0, kLongestPause), c.object,
+                present ? object->geometry->topology : 0});
 }
 
 template <>

@@ -177,6 +177,14 @@ void ObjectTable::appendEditsUnderWay(Nanos now, std::vector<ClientCommand>& out
     if (object != nullptr) object->mesh.appendEditsUnderWay(id, object->meshSetBy, out);
   }
   if (rebuildNotBefore_ > now) out.push_back({0, PauseRebuilds{rebuildNotBefore_ - now}, now});
+  if (lastTopology_ == 0) return;
+  out.push_back({0, ContinueCheck{}, now});
+  for (const MeshChecks::Pending& check : checks_.waiting()) {
+    const Object* object = find(check.object);
+    const bool isCurrent =
+        object != nullptr && object->geometry && object->geometry->topology == check.topology;
+    out.push_back({0, ContinueCheck{check.object, isCurrent, std::max<Nanos>(check.at - now, 0)}, now});
+  }
 }
 
 void ObjectTable::queue(Object& object) {

@@ -81,8 +81,7 @@ class LateRecording {
       afterEach();
     }
   }
-  /// Until a recording begins, the scene takes so long from one reading of its stopwatch to the next;
-  /// otherwise a microsecond.
+  /// The scene takes so long from one reading of its stopwatch to the next.
   void slowDown(base::Nanos reading) { reading_ = reading; }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
@@ -177,7 +176,7 @@ class LateRecording {
 
   scene::SceneConfig withStopwatch() {
     scene::SceneConfig config = device_.sceneConfig;
-    config.stopwatch = [this] { return readings_.emplace_back(stopwatch_ += recorder_ ? 1000 : reading_); };
+    config.stopwatch = [this] { return readings_.emplace_back(stopwatch_ += reading_); };
     config.owners = owners_;
     return config;
   }

@@ -359,6 +359,7 @@ TEST(RecordingBegunLate, PausesBetweenBuildsAsLong) {
   r.slowDown(100 * LateRecording::kTick);
   r.raise(0.0001);
   r.glide(kAbove, 400);
+  r.slowDown(1000);
   r.record(file.path());
   r.glide(kAbove, 450);
   r.glide({2, 19, 1}, 250);
@@ -371,6 +372,54 @@ TEST(RecordingBegunLate, PausesBetweenBuildsAsLong) {
   r.glide({2, 19, 1}, 600);
   EXPECT_GT(r.last().rendering.depth_m, 0.0025);
   endTheSame(r, file, 700);
+}
+
+// A mesh of new triangles, too, where one was there before.
+TEST(RecordingBegunLate, PausesAnUploadAsLong) {
+  for (const int edits : {76, 100}) {
+    const RecordingFile file;
+    LateRecording r;
+    r.glide({1, 60, 2}, 700);
+    r.slowDown(7 * LateRecording::kTick);
+    r.raise(0.0001);
+    r.glide({1, 60, 2}, 10);
+    const auto beforeEach = [&](int triangle) {
+      if (triangle == 5) r.record(file.path());
+    };
+    r.upload(0, 0.001, 12, beforeEach, [&] { r.glide({1, 60, 2}, 3); });
+    for (int i = 0; i < edits; ++i) {
+      r.raise(0.0001 * (edits - i));
+      r.glide({1, 60, 2}, 3);
+    }
+    r.glide(kAbove, 700);
+    r.glide({2, 19, 1}, 400);
+    EXPECT_TRUE(r.last().rendering.touching);
+    SCOPED_TRACE(testing::Message() << edits << " edits");
+    endTheSame(r, file, 700);
+  }
+}
+
+// Nor is a mesh built again for as long as its check asks for.
+TEST(RecordingBegunLate, PausesAfterACheckAsLong) {
+  for (const int begun_ms : {100, 260}) {
+    const RecordingFile file;
+    LateRecording r;
+    r.glide({1, 60, 2}, 700);
+    r.upload(
+        0, 0.001, 12, [](int) {}, [] {});
+    r.glide({1, 60, 2}, begun_ms);
+    r.record(file.path());
+    r.slowDown(4 * LateRecording::kTick);
+    for (int i = 0; i < 100; ++i) {
+      r.raise(0.0001 * (100 - i));
+      r.glide({1, 60, 2}, 3);
+    }
+    r.glide(kAbove, 700);
+    r.glide({2, 19, 1}, 400);
+    EXPECT_TRUE(r.last().rendering.touching);
+    SCOPED_TRACE(testing::Message() << "begun after " << begun_ms << " ms");
+    endTheSame(r, file, 700);
+  }
 }
 
 struct Upload {
