@@ -31,7 +31,8 @@ constexpr int kReuseLimit = 32;   // reuse the cached facets up to this count in
 }  // namespace
 
 void ContactQuery::forget() noexcept {
-  cache_.invalidate();
+  cache_.forget();
+  ++generation_;
   unfitCount_ = 0;
   joinedFans_ = false;
   roomyReach_m_ = fits_m_ = std::numeric_limits<double>::infinity();

@@ -50,6 +50,12 @@ class FacetCache {
   void add(const TriangleId& id, const Disc& disc, double skin, double rounding) noexcept;
   /// Marks the cache as incomplete.
   void invalidate() noexcept { complete_ = false; }
+  /// The same, and drops what was learnt of earlier gathers.
+  void forget() noexcept {
+    invalidate();
+    nearShare_ = kMostNearShare;
+    nearUses_ = 0;
+  }
 
   /// Whether the cache holds every facet that a tool within `radius` of p can touch.
   bool covers(const Vec3& p, double radius) const noexcept {

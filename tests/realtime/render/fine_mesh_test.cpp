@@ -196,7 +196,7 @@ TEST(FineSheet, that_moves_is_examined_in_part) {
 }
 
 // What was learnt elsewhere ends where a recording begins: from there, the same hand gives the same in every
-// bit. The levels of a fan depend on how far a tick gathers.
+// bit, by the same work. The levels of a fan depend on how far a tick gathers.
 TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
   constexpr double kRadius = 0.005;
   constexpr int kMeridians = 600;
@@ -212,17 +212,17 @@ TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
   scene.add(cone, surface(1000));
   scene.add(plane(0.008, 400), surface(1000), Affine(Eigen::Translation3d(0.1, 0, 0)));
   const auto snapshot = scene.snapshot();
-  const auto feltOn = [&](bool sheetBefore) {
+  const auto feltAfter = [&](double strokedAt_m) {
     const auto proxy = std::make_unique<Proxy>(RenderOptions{.toolRadius_m = kRadius});
     Nanos now = 0;
-    std::vector<std::pair<std::uint32_t, Vec3>> felt;
+    std::vector<std::tuple<std::uint32_t, Vec3, int>> felt;
     const auto at = [&](const Vec3& hip) {
       std::uint32_t status = 0;
       proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
-      felt.emplace_back(status, proxy->position());
+      felt.emplace_back(status, proxy->position(), proxy->visits());
     };
-    for (int i = 0; sheetBefore && i < 400; ++i)
-      at({0.1 + 0.003 * std::cos(0.1 * i), 0.003 * std::sin(0.1 * i),
+    for (int i = 0; std::isfinite(strokedAt_m) && i < 400; ++i)
+      at({strokedAt_m + 0.003 * std::cos(0.1 * i), 0.003 * std::sin(0.1 * i),
           kRadius + std::max(-0.0005, 0.001 - 5e-5 * i)});
     for (int i = 0; i < 5; ++i) at({0, 0.0002, kRadius + 0.02});
     proxy->forget();
@@ -235,7 +235,9 @@ TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
     }
     return felt;
   };
-  EXPECT_TRUE(feltOn(true) == feltOn(false));
+  const auto nothing = feltAfter(std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(feltAfter(0.1) == nothing) << "the sheet";
+  EXPECT_TRUE(feltAfter(0) == nothing) << "the cone";
 }
 
 // What fits is known from the ticks before, but for the first one: all of it would be too much in every tick.

@@ -21,12 +21,12 @@ namespace {
 
 using base::Nanos;
 
-// Time passes with each look at it.
+// Time passes with each look at it, not always as much.
 class PassingTime final : public base::Clock {
  public:
   explicit PassingTime(base::SimulatedClock& clock) : clock_(clock) {}
   Nanos now() noexcept override {
-    clock_.sleepUntil(clock_.now() + each);
+    clock_.sleepUntil(clock_.now() + each * (1 + looks_++ % 5) / 3);
     return clock_.now();
   }
   void sleepUntil(Nanos deadline) noexcept override { clock_.sleepUntil(deadline); }
@@ -36,6 +36,7 @@ class PassingTime final : public base::Clock {
 
  private:
   base::SimulatedClock& clock_;
+  int looks_ = 0;
 };
 
 class SceneOfTwoDevices : public testing::Test {
