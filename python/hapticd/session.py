@@ -120,6 +120,7 @@ _COMMANDS: Final[Dict[int, Tuple[str, Tuple[Tuple[str, str], ...]]]] = {
     44: ("RefuseBatch", ()),
     45: ("ContinueMesh", (("object", "i"), ("hasDeformed", "i"), ("edited_ns", "q"))),
     46: ("PauseRebuilds", (("pause_ns", "q"),)),
+    47: ("ContinueCheck", (("object", "i"), ("isCurrent", "i"), ("due_ns", "q"))),
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ grep -q '^tick  ' "$work/list"
 
 status=0
 "$hapticd" bench nosuchthing 2>"$work/error" || status=$?
-[ "$status" = 1 ]
+[ "$status" = 2 ]
 grep -q "there is no benchmark 'nosuchthing'" "$work/error"
 
 ln "$hapticd" "$work/hapticd" 2>/dev/null || cp "$hapticd" "$work/hapticd"

@@ -68,7 +68,7 @@ TEST_F(CommandDecoderTest, TrianglesBecomeRunsAndKeepNegativeCornersRefusable) {
   const auto& run = only<scene::SetTriangles>();
   ASSERT_EQ(run.triangles.size(), 2U);
   EXPECT_EQ(run.triangles[0], (geometry::Triangle{0, 1, 2}));
-  EXPECT_EQ(run.triangles[1][2], 0xFFFFFFFFU);
+  EXPECT_EQ(run.triangles[1][2], static_cast<std::uint32_t>(-5));
 }
 
 TEST_F(CommandDecoderTest, WrongLengthIsMalformedAndChangesNothing) {
