@@ -13,16 +13,10 @@ namespace hapticd::realtime {
 /// One contact after the other. Servo thread: noexcept, no allocation.
 class EnergyLimit {
  public:
-  /// What the springs of a tick say about the energy of the contact.
-  enum class Account {
-    kNone,    ///< something moves, or a command changed it: what is stored is taken as it is
-    kPaid,    ///< a surface yields: what the hand puts in counts, the springs act as they are
-    kLimited  ///< all rest
-  };
-
   void reset() noexcept { *this = EnergyLimit(); }
-  /// The share of `springs` that acts in this tick, 0 … 1.
-  double step(const SpringState& springs, Account account, const Vec3& hip_m, double period_s) noexcept;
+  /// The share of `springs` that acts in this tick, 0 … 1. Not `limited`: something moves or yields, or a
+  /// command changed it; what is stored then is taken as it is.
+  double step(const SpringState& springs, bool limited, const Vec3& hip_m, double period_s) noexcept;
   double share() const noexcept { return share_; }
 
  private:

@@ -15,9 +15,6 @@
 namespace hapticd::realtime {
 namespace {
 
-// What is stored changes without the hand.
-constexpr std::uint32_t kChanged =
-    kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
 constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time stamp repeats
 
 void scaleContact(double share, Rendering& out) {
@@ -40,24 +37,22 @@ Vec3 shadedSprings(const ContactSet& contactSet) {
                     : Vec3(stiffness * contactSet.normal_m);
 }
 
-bool yields(const ContactSet& contactSet, double toolRadius_m) {
-  const auto* const first = contactSet.constraints.data();
-  return std::any_of(first, first + contactSet.count, [&](const ContactConstraint& constraint) {
-    return isYielding(constraint, contactSet.spring.stiffness_N_per_m, toolRadius_m);
-  });
-}
-
-// The springs of the surfaces. Known where they rest, and neither changed nor yield.
-SpringState springsOf(const ContactSet& contactSet, bool changed, bool yields, const Rendering& out) {
+// The springs of surfaces at rest. Unknown where something moves, or where the surface changes or yields.
+SpringState restingSprings(const ContactSet& contactSet, bool changed, double toolRadius_m,
+                           const Rendering& out) {
+  constexpr std::uint32_t kChanged =
+      kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
-  const auto* const first = contactSet.constraints.data();
-  const bool slow = std::all_of(first, first + contactSet.count,
-                                [](const ContactConstraint& c) { return c.rests || c.creeps; });
-  state.known = slow && !changed && !yields && (out.status & kChanged) == 0;
+  const BlendedSpring& spring = contactSet.spring;
+  state.known = !changed && (out.status & kChanged) == 0;
+  for (int i = 0; i < contactSet.count; ++i) {
+    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
+    state.known = state.known && (constraint.rests || constraint.creeps) &&
+                  !isYielding(constraint, spring.stiffness_N_per_m, toolRadius_m);
+  }
   if (!out.touching) return state;
-  const double kappa = contactSet.spring.kappa_N_per_m;
-  state.force_N =
-      yields ? out.contactForce_N : Vec3(out.contactForce_N - out.normalForce_N + shadedSprings(contactSet));
+  const double kappa = spring.kappa_N_per_m;
+  state.force_N = out.contactForce_N - out.normalForce_N + shadedSprings(contactSet);
   state.normal = out.normal;
   state.pressed_N = out.contactForce_N.dot(out.normal);
   state.stored_J = 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
@@ -65,16 +60,13 @@ SpringState springsOf(const ContactSet& contactSet, bool changed, bool yields, c
   return state;
 }
 
-// Force shading keeps the size of the force, and gives energy.
-EnergyLimit::Account accountOf(const ContactSet& contactSet, bool commandChanged, bool yields,
-                               const Rendering& out) {
+// All that takes part in the springs. Force shading keeps the size of the force, and gives energy.
+bool restsUnshaded(const ContactSet& contactSet) {
   const auto* const first = contactSet.constraints.data();
-  const auto rests = [](const ContactConstraint& c) {
-    return c.rests && c.forceDirection == c.halfSpace.normal;
-  };
-  const bool rest = contactSet.spring.rests && std::all_of(first, first + contactSet.count, rests);
-  if (!rest || commandChanged || (out.status & kChanged) != 0) return EnergyLimit::Account::kNone;
-  return yields ? EnergyLimit::Account::kPaid : EnergyLimit::Account::kLimited;
+  return contactSet.spring.rests &&
+         std::all_of(first, first + contactSet.count, [](const ContactConstraint& c) {
+           return c.rests && c.forceDirection == c.halfSpace.normal;
+         });
 }
 
 // `share` of the springs acts.
@@ -199,10 +191,9 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   // A command that changes nothing that is felt, as of a surface elsewhere, is none here.
   const auto felt = [&] { return LastForce{out.contactForce_N, contactSet.spring.kappa_N_per_m, hip}; };
   const auto steps = [&] { return s.proxy.commandChanged() && s.last.stepsTo(felt()); };
-  const bool yielding = yields(contactSet, radius);
-  SpringState springs = springsOf(contactSet, steps(), yielding, out);
-  const EnergyLimit::Account account = accountOf(contactSet, s.proxy.commandChanged(), yielding, out);
-  const double stored = s.energy.step(springs, account, hip, period_s);
+  SpringState springs = restingSprings(contactSet, steps(), radius, out);
+  const bool limited = springs.known && !s.proxy.commandChanged() && restsUnshaded(contactSet);
+  const double stored = s.energy.step(springs, limited, hip, period_s);
   const double share =
       s.proxy.feltShare() * stored * s.rise.step(stored * out.contactForce_N, springs.known, period_s);
   scaleContact(share, out);
