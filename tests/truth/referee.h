@@ -6,7 +6,7 @@
 // | status | no jump and no release: trials contain neither |
 // | fields | touching, depth, contact count and the sum of the contacts agree |
 // | force | F <= largest K * distance of proxy and HIP, plus damping and friction |
-// | share | static, one stiffness, a point, no slits: all of the springs act, but for 10 % |
+// | share | static, one stiffness, a point, no slits: all of the springs act, but for 20 % |
 // | through | the proxy did not get where a ball of 4.9 µm can not follow: no face, no gap below 10 µm |
 // | escaped | the proxy is within the walls of the trial |
 // | lost | without contact the proxy is at the HIP |
