@@ -49,9 +49,41 @@ Point FreeSpace::direction() {
   return Point(normal(random_), normal(random_), normal(random_)).normalized();
 }
 
+// Where edges go past other faces: the way around such an edge may lead through the groove of the two, which
+// is too narrow to be found by chance. The shortest detours come first.
+void FreeSpace::findCrossings(const Point& p, const Point& q) {
+  crossings_.clear();
+  for (const int i : faces_) {
+    const Face& f = reference_.faces()[static_cast<std::size_t>(i)];
+    if (f.unbounded) continue;
+    const std::array<Point, 3> corners{f.a, f.b, f.c};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point edge = corners[(k + 1) % 3] - corners[k];
+      for (const int j : faces_) {
+        const Face& other = reference_.faces()[static_cast<std::size_t>(j)];
+        const double slope = other.normal.dot(edge);
+        const double t = slope != 0 ? other.normal.dot(other.a - corners[k]) / slope : -1.0;
+        const Point crossing = corners[k] + t * edge;
+        if (t >= 0 && t <= 1 && (crossing - centre_).norm() <= reach_ &&
+            (nearestOf(other, crossing) - crossing).norm() <= radius_)
+          crossings_.push_back(crossing);
+      }
+    }
+  }
+  const auto detour = [&](const Point& x) { return (x - p).norm() + (q - x).norm(); };
+  std::sort(crossings_.begin(), crossings_.end(),
+            [&](const Point& a, const Point& b) { return detour(a) < detour(b); });
+}
+
 // In the ball of all paths, half of them at edges, where ways around lead.
 Point FreeSpace::sample() {
   std::uniform_real_distribution<double> uniform(0, 1);
+  if (!crossings_.empty() && uniform(random_) < 0.2) {
+    const double rank = std::pow(uniform(random_), 3);
+    const Point& crossing =
+        crossings_[static_cast<std::size_t>(rank * static_cast<double>(crossings_.size()))];
+    return crossing + radius_ * (1.02 + 6 * uniform(random_) * uniform(random_)) * direction();
+  }
   if (!faces_.empty() && uniform(random_) < 0.5) {
     const Face& f = reference_.faces()[static_cast<std::size_t>(faces_[random_() % faces_.size()])];
     const std::array<Point, 3> corners{f.a, f.b, f.c};
@@ -129,6 +161,7 @@ bool FreeSpace::connectsByOneBend(const Point& p, const Point& q) {
 
 // Two trees of free segments that grow towards random places until they meet (Kuffner & LaValle 2000).
 bool FreeSpace::connectsByTrees(const Point& p, const Point& q) {
+  findCrossings(p, q);
   std::vector<Node> nodes{{p, 0}, {q, 1}};
   const auto nearestIn = [&](int tree, const Point& x) {
     const Node* nearest = nullptr;

@@ -43,6 +43,7 @@ class FreeSpace {
   Point direction();
   std::vector<Point> outward(const Point& p) const;
   bool connectsByOneBend(const Point& p, const Point& q);
+  void findCrossings(const Point& p, const Point& q);
   bool connectsByTrees(const Point& p, const Point& q);
 
   const Reference& reference_;
@@ -51,6 +52,7 @@ class FreeSpace {
   double radius_;
   bool overlapping_;
   std::vector<int> faces_;
+  std::vector<Point> crossings_;
   std::mt19937_64 random_;
 };
 

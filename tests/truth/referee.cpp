@@ -449,7 +449,9 @@ class Referee {
       return true;
     }
     double way = 0;
-    for (const int i : suspects_) way = std::max(way, (proxyBefore_ - previousPlace(i)).norm());
+    std::vector<int> walls = reference_.near(rendering_.proxy_m, kTouch_m);
+    walls.insert(walls.end(), suspects_.begin(), suspects_.end());
+    for (const int i : walls) way = std::max(way, (proxyBefore_ - previousPlace(i)).norm());
     FreeSpace space(reference_, proxyBefore_, 5 * way + 400e-6, kFollower_m + way,
                     trial_.seed + static_cast<std::uint64_t>(tick_));
     if (placeBefore(space, {kSuspect_m})) return false;

@@ -145,7 +145,7 @@ TEST(Referee, mended_findings_stay_mended) {
                                   << verdict.finding->text;
     ++count;
   }
-  EXPECT_GE(count, 55);
+  EXPECT_GE(count, 57);
 }
 
 // A ball goes past an edge to the other side of a strip, 7 mm in the last tick, and the casts of the tick end
