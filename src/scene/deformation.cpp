@@ -171,6 +171,28 @@ SpatialIndex Deformation::indexOver(const std::shared_ptr<const std::vector<Tria
   return index;
 }
 
+// As if the surface were spread over its bounds: how many boxes there are around a place of it.
+bool Deformation::boxesAreAroundEachOther(const Box& bounds) const {
+  constexpr double kFew = 512;
+  const auto count = static_cast<Eigen::Index>(sweep_.lower.size() - 1);
+  const Eigen::Map<const Eigen::ArrayXf> lower(sweep_.lower.data(), count);
+  const Eigen::Map<const Eigen::ArrayXf> upper(sweep_.upper.data(), count);
+  const double extent = bounds.extents().maxCoeff();
+  return static_cast<double>((upper - lower).max(0).square().sum()) > kFew * extent * extent;
+}
+
+// A mesh that leapt may rest for long. A tick would spend its work on what the boxes around all ways propose.
+SpatialIndex Deformation::indexOfArrived(const std::vector<Triangle>& triangles,
+                                         const std::vector<Vec3f>& target) {
+  std::copy_n(flat(target), 3 * target.size(), sweep_.lower.begin());
+  std::copy_n(flat(target), 3 * target.size(), sweep_.upper.begin());
+  leaveOutLoneVertices();
+  SpatialIndex index = spareIsFree() ? std::move(spare_->indexOfArrived) : SpatialIndex();
+  if (index.refits() >= kRefitsBeforeRebuild) index = {};
+  index.refit({triangles, sweep_.lower, sweep_.upper});
+  return index;
+}
+
 std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> old,
                                                 std::shared_ptr<const std::vector<Triangle>> triangles,
                                                 std::shared_ptr<const std::vector<Vec3f>> target, Nanos now) {
@@ -184,6 +206,7 @@ std::shared_ptr<MeshGeometry> Deformation::next(std::shared_ptr<MeshGeometry> ol
   coverTrajectory(*old);
   mesh->index = indexOver(triangles);
   mesh->bounds = boundsOf(*target, lone_);
+  if (boxesAreAroundEachOther(mesh->bounds)) mesh->indexOfArrived = indexOfArrived(*triangles, *target);
   mesh->boundsOnTheWay = old->boundsAfter(now);
   mesh->boundsOnTheWay.extend(mesh->bounds);
   mesh->target = std::move(target);

@@ -62,6 +62,8 @@ class Deformation {
   void leaveOutLoneVertices();
   bool spareIsFree() const;
   SpatialIndex indexOver(const std::shared_ptr<const std::vector<Triangle>>& triangles);
+  bool boxesAreAroundEachOther(const Box& bounds) const;
+  SpatialIndex indexOfArrived(const std::vector<Triangle>& triangles, const std::vector<Vec3f>& target);
 
   // Sums of longestMove() over the last 100 to 200 ms.
   struct Moves {

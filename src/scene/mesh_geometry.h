@@ -37,9 +37,12 @@ struct MeshGeometry {
   /// Upper bound of the way of a vertex during the shapes of the last 100 ms, object units. The index does
   /// not cover it: a late tick that missed a shape adds it to its reach.
   double recentMove = 0;
-  Box bounds;                                  ///< of the shape once it has arrived: its index may cover more
-  Box boundsOnTheWay;                          ///< of all shapes that it has while it deforms
-  SpatialIndex index;                          ///< over triangle ids, in object units
+  Box bounds;          ///< of the shape once it has arrived: its index may cover more
+  Box boundsOnTheWay;  ///< of all shapes that it has while it deforms
+  SpatialIndex index;  ///< over triangle ids, in object units
+  /// Over the shape once it has arrived, after a way so long that boxes around it are around each other;
+  /// empty otherwise.
+  SpatialIndex indexOfArrived;
   std::shared_ptr<const geometry::Fans> fans;  ///< null without any, and once a vertex has moved
   /// For a ball tool; null without one, and once a vertex has moved.
   std::shared_ptr<const geometry::DiscTree> discs;
@@ -48,6 +51,11 @@ struct MeshGeometry {
   const std::vector<Vec3f>& shapeVertices() const noexcept { return target ? *target : *vertices; }
   const Box& boundsAfter(Nanos now) const noexcept { return deformingAfter(now) ? boundsOnTheWay : bounds; }
   bool deformingAfter(Nanos now) const noexcept { return target && now < morphEnd; }
+
+  /// For what is asked of the shape at `now` alone, without the way to it.
+  const SpatialIndex& indexAt(Nanos now) const noexcept {
+    return indexOfArrived.size() > 0 && !deformingAfter(now) ? indexOfArrived : index;
+  }
 
   /// Corners of a triangle at `now`, object units. noexcept, allocation-free.
   Corners corners(std::uint32_t triangle, Nanos now) const noexcept {

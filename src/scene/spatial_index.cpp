@@ -17,6 +17,8 @@ namespace {
 constexpr double kRelativePad = 0x1p-20;
 // Largest coordinate in the tree, of the centre of a query, and a radius that reaches everything from there.
 constexpr double kReach = 4;
+// A refitted tree whose boxes take less of it is built anew: its pad would be wider than they are.
+constexpr double kLeastShare = 0x1p-8;
 constexpr double kFarCentre = 64;
 constexpr double kWholeTree = 256;
 // Of a point on a segment, relative to the segment's ends.
@@ -40,6 +42,11 @@ Lanes lanesOf(const Vec3f& v) {
 
 bool isUsable(const Box& box) {
   return !box.empty() && box.min.minCoeff() >= -kFarthest && box.max.maxCoeff() <= kFarthest;
+}
+
+// Half of the extent, or what is as fine as the coordinates.
+double sizeOf(const Box& bounds) {
+  return std::max(bounds.extents().maxCoeff() / 2, kRelativePad * bounds.centre().cwiseAbs().maxCoeff());
 }
 
 Box boundsOf(const BoxedTriangles& all) {
@@ -168,8 +175,7 @@ struct SpatialIndex::Tree {
 
   explicit Tree(const Box& bounds) {
     origin = bounds.centre();
-    const double size =
-        std::max(bounds.extents().maxCoeff() / 2, kRelativePad * origin.cwiseAbs().maxCoeff());
+    const double size = sizeOf(bounds);
     // Less than 2 at first: there is room to grow by refitting.
     if (size > 0) scale = std::exp2(-std::max(std::ilogb(size), -1000));
     // What is too large or small for a float here is not refitted.
@@ -216,8 +222,10 @@ struct SpatialIndex::Tree {
   Lanes upper(const Lanes& p) const noexcept { return (p - near) * times + above; }
 
   // Without what the float path takes for granted; rounding is monotonic, so that every box within fits, too.
-  bool hasRoomFor(const Box& box) const noexcept {
+  bool suits(const Box& box) const noexcept {
     if (!(scale >= kSmallestScale && scale <= 1 / kSmallestScale)) return false;
+    const double size = sizeOf(box);
+    if (size > 0 && size * scale < kLeastShare) return false;
     const Lanes low = lower(lanesOf(box.min.cast<float>()));
     const Lanes high = upper(lanesOf(box.max.cast<float>()));
     return (low.head<3>() >= -kReach).all() && (high.head<3>() <= kReach).all();
@@ -315,7 +323,7 @@ SpatialIndex SpatialIndex::build(const BoxedTriangles& all) {
 
 void SpatialIndex::refit(const BoxedTriangles& all) {
   const Box bounds = boundsOf(all);
-  if (!tree_ || !tree_->hasRoomFor(bounds)) {
+  if (!tree_ || !tree_->suits(bounds)) {
     *this = build(all);
     return;
   }

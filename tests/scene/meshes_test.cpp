@@ -461,6 +461,29 @@ TEST_F(Deforming, IncompleteTrianglesAndLoneVerticesAreLeftOut) {
   }
 }
 
+// While they leap, their boxes are around all of their ways; once they rest, each is at its triangle.
+TEST_F(Deforming, MeshesThatLeaptAreFoundTriangleByTriangle) {
+  makeTouchable(0, soup(1'000));
+  const auto proposed = [&](const SpatialIndex& index) {
+    std::set<std::uint32_t> ids;
+    index.visitNear(Vec3(600.2, 0.2, 0), 0.1, [&](std::uint32_t id) { ids.insert(id); });
+    return ids;
+  };
+  for (const float aside : {1'000.0F, 0.0F, 900.0F, 0.0F}) {
+    std::vector<Vec3f> shape = soup(1'000);
+    for (Vec3f& v : shape) v.x() += aside;
+    previous_.reset();
+    say(SetVertices{0, 0, shape});
+    run(20 * kMillisecond);
+    const MeshGeometry& mesh = *object(0)->mesh;
+    EXPECT_GT(proposed(mesh.indexAt(mesh.morphEnd - 1)).size(), 100U);
+    const auto atRest = proposed(mesh.indexAt(mesh.morphEnd));
+    EXPECT_EQ(atRest.count(300), aside == 0 ? 1U : 0U) << aside;
+    EXPECT_LE(atRest.size(), 16U) << aside;
+    run(100 * kMillisecond);
+  }
+}
+
 // A snapshot that is still held keeps its shape, whatever is refitted for later ones.
 TEST_F(Deforming, HeldSnapshotsStayAsTheyAre) {
   std::vector<std::shared_ptr<const SceneSnapshot>> held;

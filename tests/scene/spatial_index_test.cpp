@@ -230,6 +230,25 @@ TEST(SpatialIndex, RefitsOfHugeAndTinyBoxesAreRight) {
   }
 }
 
+// The pad of a tree is a share of its size.
+TEST(SpatialIndex, RefitsThatShrinkProposeFew) {
+  constexpr std::uint32_t kCount = 1'000;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < kCount; ++i) triangles.push_back({i, i, i});
+  const auto row = [](float step) {
+    std::vector<float> all(3 * kCount + 1);
+    for (std::size_t i = 0; i < kCount; ++i) all[3 * i] = step * static_cast<float>(i);
+    return all;
+  };
+  const std::vector<float> kilometres = row(1e6F);
+  const std::vector<float> millimetres = row(1);
+  SpatialIndex index = SpatialIndex::build(BoxedTriangles{triangles, kilometres, kilometres});
+  index.refit({triangles, millimetres, millimetres});
+  const std::set<std::uint32_t> found = near(index, Vec3(500, 0, 0), 0.1);
+  EXPECT_EQ(found.count(500), 1U);
+  EXPECT_LE(found.size(), 16U);
+}
+
 TEST(SpatialIndex, RefitsAreCountedFromTheBuildOn) {
   World world(7);
   const Sheet sheet(world);

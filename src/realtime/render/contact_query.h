@@ -60,6 +60,10 @@ struct PlacedObject {
   /// The same for a triangle between any three vertices.
   scene::Corners corners(const geometry::Triangle& triangle, Nanos now) const noexcept;
   scene::Corners cornersBefore(std::uint32_t triangle, Nanos then) const noexcept;
+  /// Its triangles; while it deforms, around their whole way.
+  const scene::SpatialIndex& index(Nanos now) const noexcept {
+    return deformed ? state->mesh->index : state->mesh->indexAt(now);
+  }
   /// Whether it is where and as it was in the previous tick.
   bool rests() const noexcept { return before != nullptr && !moved && !deformed && !jumped; }
   /// Whether its faces may have passed over the proxy by deforming.

@@ -184,7 +184,7 @@ bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexce
     const PlacedObject& placed = object(i);
     const double reach_m = reach + placed.radius + 4 * placed.skin;
     const Vec3 inObject = placed.T_object_device * middle;
-    placed.state->mesh->index.visitNear(
+    placed.index(now_.time).visitNear(
         inObject, reach_m * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept -> bool {
           if (workSpent()) return false;
           if (!mayReach(placed, triangle, inObject, reach_m)) return true;

@@ -307,16 +307,17 @@ void ContactQuery::gatherByIndex(int i, const Vec3& from, const Vec3& way, doubl
   const double around = reach + 0.5 * way.norm();
   std::optional<JoinedFans> fans;
   if (mesh.fans && !placed.deformed) fans.emplace(placed, now_.time, start, end, reach, toolRadius_);
-  mesh.index.visitNear(inObject, around * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
-    FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
-    if (fans && !fans->join(id)) {
-      ++work_;
-    } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, around)) {
-      addToCache(id);
-    }
-    if (workSpent()) cache_.invalidate();
-    return cache_.complete();
-  });
+  placed.index(now_.time).visitNear(
+      inObject, around * kWiden * placed.stretch, [&](std::uint32_t triangle) noexcept {
+        FacetCache::TriangleId id{triangle, static_cast<std::int16_t>(i), 0};
+        if (fans && !fans->join(id)) {
+          ++work_;
+        } else if (placed.deformed || id.level > 0 || mayReach(placed, triangle, inObject, around)) {
+          addToCache(id);
+        }
+        if (workSpent()) cache_.invalidate();
+        return cache_.complete();
+      });
   joinedFans_ = joinedFans_ || (fans && fans->any());
 }
 

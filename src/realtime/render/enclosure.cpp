@@ -65,7 +65,7 @@ class Test {
   bool enclosedAlong(int ray) noexcept {
     const Vec3 d = reach_ * rayAlong(ray);
     int sum = 0;
-    mesh_.index.visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {
+    mesh_.indexAt(now_).visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {
       if (--budget_.visits <= 0) return -1.0;
       sum += crossing(mesh_.corners(triangle, now_), p_, d);
       return 1.0;
@@ -80,13 +80,15 @@ class Test {
     if (radius_m == 0) return false;
     bool within = false;
     const Vec3 at = object_.T_device_object * p_;
-    mesh_.index.visitNear(p_, radius_m * object_.stretch, [&](std::uint32_t triangle) noexcept -> bool {
-      if (--budget_.visits <= 0) return false;
-      Facet facet;
-      if (!makeFacet(object_.corners(triangle, now_), object_.skin, facet)) return true;
-      within = (nearestPointOf(facet, at) - at).norm() < radius_m;
-      return !within;
-    });
+    mesh_.indexAt(now_).visitNear(p_, radius_m * object_.stretch,
+                                  [&](std::uint32_t triangle) noexcept -> bool {
+                                    if (--budget_.visits <= 0) return false;
+                                    Facet facet;
+                                    if (!makeFacet(object_.corners(triangle, now_), object_.skin, facet))
+                                      return true;
+                                    within = (nearestPointOf(facet, at) - at).norm() < radius_m;
+                                    return !within;
+                                  });
     return within || isSpent();
   }
 

@@ -19,7 +19,7 @@ Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corn
   const scene::MeshGeometry& mesh = *object.state->mesh;
   Vec3 sum = Vec3::Zero();
   int visits = 0;
-  mesh.index.visitNear(corner, 0, [&](std::uint32_t t) noexcept -> bool {
+  mesh.indexAt(now).visitNear(corner, 0, [&](std::uint32_t t) noexcept -> bool {
     if (++visits > kMostFaces) return false;
     const scene::Corners inObject = mesh.corners(t, now);
     const scene::Corners k = object.corners(t, now);
@@ -65,17 +65,19 @@ struct MeetingFaces {
   MeetingFaces(const PlacedObject& object, const Vec3& place, Nanos now) {
     const double near_m = 4 * object.skin;
     int visits = 0;
-    object.state->mesh->index.visitNear(object.T_object_device * place,
-                                        near_m * object.T_object_device.linear().norm(),
-                                        [&](std::uint32_t t) noexcept -> bool {
-                                          if (++visits > kMostFaces || count == kMost) return false;
-                                          Facet f;
-                                          if (!makeFacet(object.corners(t, now), object.skin, f)) return true;
-                                          if ((nearestPointOf(f, place) - place).norm() > near_m) return true;
-                                          normals[count] = f.normal;
-                                          triangles[count++] = t;
-                                          return true;
-                                        });
+    object.state->mesh->indexAt(now).visitNear(object.T_object_device * place,
+                                               near_m * object.T_object_device.linear().norm(),
+                                               [&](std::uint32_t t) noexcept -> bool {
+                                                 if (++visits > kMostFaces || count == kMost) return false;
+                                                 Facet f;
+                                                 if (!makeFacet(object.corners(t, now), object.skin, f))
+                                                   return true;
+                                                 if ((nearestPointOf(f, place) - place).norm() > near_m)
+                                                   return true;
+                                                 normals[count] = f.normal;
+                                                 triangles[count++] = t;
+                                                 return true;
+                                               });
   }
   // The one that lies most across this direction, seen from either side.
   std::size_t across(const Vec3& direction) const {

@@ -59,7 +59,7 @@ double ObjectDistances::examine(const scene::ObjectState& state, const Query& qu
   double nearest = kFarthest_m * in.stretch;
   if (in.outside < nearest) {
     int visits = 0;
-    mesh.index.visitNearest(in.position, nearest, [&](std::uint32_t triangle) noexcept {
+    mesh.indexAt(query.now).visitNearest(in.position, nearest, [&](std::uint32_t triangle) noexcept {
       if (++visits > kMostTriangles) {
         nearest = 0;
         return -1.0;

@@ -269,7 +269,8 @@ void NeighbourSearch::addObject(const scene::ObjectState& state) {
   const Affine T_object_device = placed.T_device_object.inverse();
   const double stretch = kQueryMargin * T_object_device.linear().norm();
   const auto reach = [&] { return (n->distance + gauge_.radius) * stretch; };
-  state.mesh->index.visitNearest(T_object_device * proxy_, reach(), [&](std::uint32_t triangle) noexcept {
+  const scene::SpatialIndex& index = state.mesh->indexAt(now_.time);
+  index.visitNearest(T_object_device * proxy_, reach(), [&](std::uint32_t triangle) noexcept {
     if (visits_ == kMaxVisits) {
       complete_ = false;
       return -1.0;

@@ -330,6 +330,37 @@ TEST_P(Starts, quick_frames_of_a_mesh_do_not_swallow_the_hand) {
   EXPECT_TRUE(feels(0.018 - gap_m));
 }
 
+// A soft body that a simulation resets: its vertices come back from afar, and it rests. The oracle is the
+// sphere; facets are less than 0.02 mm inside of it.
+TEST(Leaps, fine_mesh_that_came_back_is_felt_in_every_tick) {
+  constexpr double kRadius_m = 0.020;
+  constexpr double kDepth_m = 0.002;
+  const auto sphere = [&](double aside_mm) {
+    std::vector<Vec3f> triples = sphereTriples(1e3 * kRadius_m, 100, 100);
+    for (Vec3f& v : triples) v += Vec3f::Constant(static_cast<float>(aside_mm));
+    return triples;
+  };
+  for (const double radius : {0.0, 0.001}) {
+    for (const double aside_mm : {50.0, 3e6}) {
+      Loop loop({.toolRadius_m = radius});
+      loop.add(0, sphere(0));
+      const Vec3 away(0.04, -0.04, 0.04);
+      loop.rest(away, toNanos(0.1));
+      for (const double to_mm : {aside_mm, 0.0}) {
+        loop.send(scene::SetVertices{0, 0, sphere(to_mm)});
+        loop.rest(away, toNanos(0.2));
+      }
+      loop.to({0.02, 0.02, 0.02});
+      int silent = 0;
+      loop.to(Vec3::Constant((kRadius_m + radius - kDepth_m) / std::sqrt(3)),
+              [&] { silent += loop.out.status != 0 ? 1 : 0; });
+      EXPECT_EQ(silent, 0) << aside_mm << " mm, tool " << radius;
+      EXPECT_NEAR(loop.out.force_N.norm(), kStiffness_N_per_m * kDepth_m, 0.02)
+          << aside_mm << " mm, tool " << radius;
+    }
+  }
+}
+
 TEST_P(Starts, late_ticks_during_a_deformation_do_not_swallow_the_hand) {
   const auto shifted = [&](double by_mm) {
     std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
