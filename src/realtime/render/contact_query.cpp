@@ -180,6 +180,16 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
       !std::equal(known.begin(), knownEnd, enclosing_.begin(), enclosing_.begin() + enclosingCount_);
 }
 
+void ContactQuery::leaveOut(int object) noexcept {
+  if (enclosingCount_ == kMaxObjects) return;
+  const auto at = objects_.begin() + object;
+  enclosing_[static_cast<std::size_t>(enclosingCount_++)] = at->state->id;
+  std::move(at + 1, objects_.begin() + objectCount_, at);
+  --objectCount_;
+  leftOutChanged_ = true;
+  dropStaleFacets();
+}
+
 int ContactQuery::addObject(std::int32_t id) noexcept {
   const ObjectState* state = now_.scene->find(id);
   if (state == nullptr) return -1;

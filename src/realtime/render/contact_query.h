@@ -115,7 +115,9 @@ class ContactQuery {
   void addObjectsNear(const Vec3& centre, double reach, const Vec3& tool) noexcept;
   /// Leaves out those that appeared around `tool` and that it has not left since.
   void leaveOutEnclosing(const Vec3& tool) noexcept;
-  /// True when the last leaveOutEnclosing() left this object out.
+  /// The same for this object, whose index the ones after it take.
+  void leaveOut(int object) noexcept;
+  /// True when this object is left out.
   bool isLeftOut(std::int32_t id) const noexcept {
     return std::find(enclosing_.begin(), enclosing_.begin() + enclosingCount_, id) !=
            enclosing_.begin() + enclosingCount_;

@@ -63,6 +63,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   carry(hip, status);
   expectedTravel_m_ = (hip - hipBefore_).norm() + (position_ - from).norm();
   push(from, status);
+  leaveOutWhatSwallowed(from);
   wasHeld_ = contactSet_.count > 0;
   if (contactSet_.count > 0) {
     const double carried = (position_ - from).norm();

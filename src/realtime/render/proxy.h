@@ -166,6 +166,7 @@ class Proxy {
   bool surfacesInContactMove() const noexcept;
   Vec3 carriedBy(const PlacedObject& object, std::uint32_t triangle, const Vec3& p) const noexcept;
   void push(const Vec3& from, std::uint32_t& status) noexcept;
+  void leaveOutWhatSwallowed(const Vec3& from) noexcept;
   bool pushUntilFree(const Vec3& from, std::uint32_t& status) noexcept;
   void gatherSweeps(const Vec3& from) noexcept;
   bool pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept;
@@ -260,6 +261,7 @@ class Proxy {
   bool commandChanged_ = false;
   double share_ = 1;
   bool released_ = false;           // contact released until the HIP leaves the surface
+  std::uint64_t missed_ = 0;        // objects whose sweep of this tick was not examined whole
   std::int32_t jumper_ = -1;        // id of the object that jumped and released it; -1: none
   Vec3 beforeJump_ = Vec3::Zero();  // where that found the proxy
   bool carriedByJump_ = false;      // in this tick

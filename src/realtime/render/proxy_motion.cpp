@@ -344,6 +344,7 @@ Vec3 Proxy::carriedBy(const PlacedObject& object, std::uint32_t triangle, const 
 void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
   const Vec3 carried = position_;
   const double travel = expectedTravel_m_;
+  missed_ = 0;
   gatherSweeps(from);
   if (pushUntilFree(from, status)) {
     if (query_.workSpent()) holdPlanesBack();
@@ -357,6 +358,20 @@ void Proxy::push(const Vec3& from, std::uint32_t& status) noexcept {
     query_.castPointTool(false);
   }
   holdPlanesBack();
+}
+
+// Faces that were not examined push nothing. A body that got around the proxy with them would hold the hand
+// inside.
+void Proxy::leaveOutWhatSwallowed(const Vec3& from) noexcept {
+  EnclosureBudget budget;
+  for (int i = query_.objectCount() - 1; missed_ != 0 && i >= 0; --i) {
+    if ((missed_ >> i & 1U) == 0) continue;
+    const PlacedObject& object = query_.object(i);
+    if (!encloses(object, query_.faces(), now_.time, position_, 0, budget)) continue;
+    const bool known = budget.visits > 0;
+    if (known && encloses(object, query_.faces(), before_.time, object.carried(from), 0, budget)) continue;
+    query_.leaveOut(i);
+  }
 }
 
 // The way on which one face pushes the proxy is a way relative to all others, so this goes on until no face
@@ -441,7 +456,11 @@ bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& sta
     const Vec3 start = object.carried(from);
     const Vec3 displacement = position_ - start;
     ObjectHit hit;
-    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit) && !hit.unexamined) {
+    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
+      if (hit.unexamined) {
+        missed_ |= std::uint64_t{1} << i;
+        continue;
+      }
       pushTo(start + hit.stop * displacement, hit.halfSpace, pushers);
       pushed = true;
       touchedObject_ = object.state->id;
@@ -527,13 +546,18 @@ void Proxy::holdPlanesBack() noexcept {
 // index cover the whole deformation, so the reach need only add the motion of the placement and of the proxy.
 bool Proxy::pushByDeformingFaces(const Vec3& from, Pushers& pushers, std::uint32_t& status) noexcept {
   double reach = -1;
+  std::uint64_t sweeping = 0;
   for (int i = 0; i < query_.objectCount(); ++i) {
     const PlacedObject& object = query_.object(i);
-    if (object.sweptByDeforming())
-      reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
+    if (!object.sweptByDeforming()) continue;
+    sweeping |= std::uint64_t{1} << i;
+    reach = std::max(reach, (object.carried(from) - position_).norm() + missedMove(object));
   }
   if (reach < 0) return false;
-  if (!query_.gather(position_, reach + kGatherMargin_m)) status |= kRenderCandidateLimit;
+  if (!query_.gather(position_, reach + kGatherMargin_m)) {
+    status |= kRenderCandidateLimit;
+    missed_ |= sweeping;
+  }
   ObjectHit farthest;
   double height = 0;
   query_.forEachGathered(position_, std::numeric_limits<double>::infinity(), [&](const Facet& f) {

@@ -361,6 +361,46 @@ TEST(Leaps, fine_mesh_that_came_back_is_felt_in_every_tick) {
   }
 }
 
+// More faces pass the hand than a tick can examine: it ends outside, or the client reads that it is inside.
+// The oracle is the sphere.
+TEST(Leaps, fine_mesh_that_leaps_over_the_hand_does_not_swallow_it_silently) {
+  constexpr double kRadius_m = 0.020;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int inside = 0;
+  int beyond = 0;
+  for (int round = 0; round < 12; ++round) {
+    const Vec3 way = Vec3(uniform(random), uniform(random), uniform(random)).normalized();
+    const double ahead_m = 0.5 * (1.1 + 0.9 * uniform(random)) * 0.03;
+    const double leap_m = round % 2 == 0 ? 0.03 : 0.06;
+    const Vec3 hip = (kRadius_m + ahead_m) * way;
+    const auto sphere = [&](double by_m) {
+      std::vector<Vec3f> triples = sphereTriples(1e3 * kRadius_m, 100, 100);
+      for (Vec3f& v : triples) v += (1e3 * by_m * way).cast<float>();
+      return triples;
+    };
+    Loop loop;
+    loop.add(0, sphere(0));
+    loop.rest(hip, toNanos(0.3));
+    loop.send(scene::SetVertices{0, 0, sphere(leap_m)});
+    loop.rest(hip, toNanos(0.3));
+    if ((hip - leap_m * way).norm() > kRadius_m) {
+      ++beyond;
+      continue;
+    }
+    ++inside;
+    EXPECT_TRUE(loop.out.force_N.norm() > 0 || loop.out.status != 0) << "round " << round;
+    // Once the hand has left, the sphere is felt.
+    loop.to((leap_m + kRadius_m + 0.005) * way);
+    loop.rest((leap_m + kRadius_m + 0.005) * way, toNanos(0.1));
+    loop.to((leap_m + kRadius_m - 0.002) * way);
+    EXPECT_NEAR(loop.out.force_N.norm(), kStiffness_N_per_m * 0.002, 0.02) << "round " << round;
+    EXPECT_EQ(loop.out.status, 0U) << "round " << round;
+  }
+  EXPECT_GE(inside, 6);
+  EXPECT_GE(beyond, 2);
+}
+
 TEST_P(Starts, late_ticks_during_a_deformation_do_not_swallow_the_hand) {
   const auto shifted = [&](double by_mm) {
     std::vector<Vec3f> vertices = plate(std::get<0>(GetParam()));
