@@ -255,6 +255,10 @@ void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
                 " plane 0, ", value);
     return;
   }
+  const double most_m = kHighestDetail_m * worldUnitsPerMetre_ / kWorldUnitsPerStockMetre;
+  if (std::max(c.textureAmplitude_m, c.buzzAmplitude_m) > most_m)
+    call.warn(kName, "a texture or buzz is higher than 10 mm of the device and is lowered to that",
+              " plane 0, ", std::max(c.textureAmplitude_m, c.buzzAmplitude_m), " m to ", most_m);
   asked_.keep(c, call.client);
   Plane detail;
   detail.adhesionNormal_N = c.adhesionNormal_N;

@@ -105,18 +105,28 @@ double FreeForces::loadWith(const std::vector<ForceField>& fields, double worldU
 
 // Each alone is within the bound, together they may not be. A contact is one surface: between two it is no
 // stiffer than the stiffer one.
-void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const {
-  const double load = loadWith(forces.fields, worldUnitsPerMetre);
-  if (load == 0) return;
+double FreeForces::shareTogether(double load_Ns_per_m) const {
+  if (load_Ns_per_m == 0) return 1;
   double heaviest = heaviestSurface_Ns_per_m_;
-  for (Plane& plane : forces.planes) {
-    if (!plane.releasing) heaviest = std::max(heaviest, loadOf(plane.surface, bound_));
-    keepPassiveBeside(plane.surface, load, bound_);
+  for (const auto& [index, entry] : planes_) {
+    if (!entry.value.releasing) heaviest = std::max(heaviest, loadOf(entry.value.surface, bound_));
   }
-  const double share = bound_.shareOf(load + heaviest);
-  if (share == 1) return;
-  for (Effect& effect : forces.effects) effect.gain *= share;
-  for (ForceField& field : forces.fields) field.jacobian_N_per_unit *= share;
+  return bound_.shareOf(load_Ns_per_m + heaviest);
+}
+
+void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) {
+  const double load = loadWith(forces.fields, worldUnitsPerMetre);
+  worldUnitsPerMetre_ = worldUnitsPerMetre;
+  share_ = shareTogether(load);
+  if (load == 0) return;
+  for (Plane& plane : forces.planes) keepPassiveBeside(plane.surface, load, bound_);
+  if (share_ == 1) return;
+  for (Effect& effect : forces.effects) {
+    if (!effect.releasing) effect.gain *= share_;
+  }
+  for (ForceField& field : forces.fields) {
+    if (!field.releasing) field.jacobian_N_per_unit *= share_;
+  }
 }
 
 // Once for each field and share: its owner learns why it feels less than it asked for.
@@ -229,22 +239,37 @@ void FreeForces::boundReleasingEffects() {
   }
 }
 
+// What ramps out stays as weak as it was beside the others, although it counts no more.
 template <class F>
 void FreeForces::release(const F& whose, Nanos now) {
+  const double load = load_Ns_per_m(worldUnitsPerMetre_);
+  const double share = std::min(share_, shareTogether(load));
+  // True for one that begins to ramp out.
   const auto letGo = [&](auto& owned, bool& releasing) {
-    if (!whose(owned.owner) || releasing) return;
+    if (!whose(owned.owner) || releasing) return false;
     releasing = true;
     owned.goneAt = std::min(owned.goneAt, now + kRelease);
-    changed_ = true;
+    return changed_ = true;
   };
   std::erase_if(effects_, [&](const auto& e) { return whose(e.second.owner) && !e.second.value.running; });
   std::erase_if(waitingStarts_, [&](const auto& e) { return whose(e.second.owner); });
-  for (auto& [index, entry] : effects_) letGo(entry, entry.value.effect.releasing);
+  for (auto& [index, entry] : effects_) {
+    if (letGo(entry, entry.value.effect.releasing)) entry.value.effect.gain *= share;
+  }
   boundReleasingEffects();
-  for (auto& [index, entry] : planes_) letGo(entry, entry.value.releasing);
+  for (auto& [index, entry] : planes_) {
+    if (letGo(entry, entry.value.releasing)) keepPassiveBeside(entry.value.surface, load, bound_);
+  }
   if (planeDetail_) letGo(*planeDetail_, planeDetail_->value.releasing);
-  if (field_) letGo(*field_, field_->value.releasing);
-  if (constraint_) letGo(*constraint_, constraint_->value.releasing);
+  if (field_ && letGo(*field_, field_->value.releasing)) {
+    field_->value = passive(field_->value, worldUnitsPerMetre_);
+    field_->value.jacobian_N_per_unit *= share;
+  }
+  if (constraint_ && letGo(*constraint_, constraint_->value.releasing)) {
+    double& stiffness = constraint_->value.stiffness_N_per_m;
+    const double most = bound_.maxStiffness_N_per_m() * kWorldUnitsPerStockMetre / worldUnitsPerMetre_;
+    stiffness = share * std::min(stiffness, most);
+  }
   if (buzz_) letGo(*buzz_, buzz_->value.releasing);
 }
 

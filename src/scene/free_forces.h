@@ -131,7 +131,8 @@ class FreeForces {
   double loadWith(const std::vector<ForceField>& fields, double worldUnitsPerMetre) const;
   SpringSum sumOfEffects() const;
   void tellOfSum(const Call& call) const;
-  void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre) const;
+  double shareTogether(double load_Ns_per_m) const;
+  void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre);
   void tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now, NoticeBoard& board,
                     std::vector<Notice>& out);
   Constraint& constraintFor(const Call& call);
@@ -155,6 +156,8 @@ class FreeForces {
   LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
   double heaviestSurface_Ns_per_m_ = 0;  // of objects, when last published
+  double worldUnitsPerMetre_ = 1000;     // then
+  double share_ = 1;                     // then, of what does not ramp out
   FieldShare fieldTold_;
   FieldShare constraintTold_;
   bool changed_ = false;

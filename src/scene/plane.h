@@ -13,6 +13,10 @@ namespace hapticd::scene {
 
 inline constexpr std::int32_t kMaxPlanes = 8;
 
+/// Texture and buzz raise a plane by at most this each, in metres of the device: a command that changes the
+/// texture is no farther motion than one that moves the plane may be.
+inline constexpr double kHighestDetail_m = 0.010;
+
 /// A half space: solid where normal · x + offset < 0. World frame and units; only the front exerts force.
 struct Plane {
   std::int32_t index = 0;

@@ -580,6 +580,19 @@ TEST_F(Forces, TextureAndBuzzEndWithTheirClient) {
   EXPECT_DOUBLE_EQ(scene_->planes.at(0).buzzAmplitude, 1);
 }
 
+TEST_F(Forces, WhoSendsATextureOfMoreThan10mmOfTheDeviceIsTold) {
+  say(SetPlaneDetail{.textureAmplitude_m = 0.010, .textureWavelength_m = 0.1, .buzzAmplitude_m = 0.010});
+  EXPECT_TRUE(notices_.empty());
+  say(SetPlaneDetail{.textureAmplitude_m = 0.5, .textureWavelength_m = 2});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.5 m to 0.01"));
+  say(SetHapticScale{10});
+  publish();
+  say(SetPlaneDetail{.textureAmplitude_m = 0.09, .textureWavelength_m = 1});
+  EXPECT_TRUE(notices_.empty()) << "9 mm of the device";
+  say(SetPlaneDetail{.buzzAmplitude_m = 0.2, .buzzFrequency_Hz = 10});
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.2 m to 0.1"));
+}
+
 TEST_F(Forces, FieldIsInWorldUnitsAndAllZeroStopsIt) {
   say(SetForceField{.origin_m = Vec3(0.01, 0, 0),
                     .force_N = Vec3(0, 1, 0),

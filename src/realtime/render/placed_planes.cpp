@@ -52,15 +52,18 @@ double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, N
                               double metresPerUnit) const noexcept {
   const double age = base::toSeconds(now - memory.placed);
   const double recovery = std::max(base::toSeconds(plane.recovery), memory.depth_m / kFastest_m_per_s);
+  const auto onDevice = [&](double amplitude) {
+    return std::min(metresPerUnit * amplitude, scene::kHighestDetail_m);
+  };
   double height = 0;
   if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
   if (plane.textureWavelength > 0) {
     // The first contact becomes the centre of the texture, so the HIP always meets a crest.
     const Vec3 offset = memory.touched ? Vec3(proxy_ - memory.firstContact) : Vec3(Vec3::Zero());
     const double r = (offset - plane.normal * plane.normal.dot(offset)).norm();
-    height += metresPerUnit * plane.textureAmplitude * std::cos(kTau * r / plane.textureWavelength);
+    height += onDevice(plane.textureAmplitude) * std::cos(kTau * r / plane.textureWavelength);
   }
-  height += metresPerUnit * plane.buzzAmplitude * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
+  height += onDevice(plane.buzzAmplitude) * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
   return height;
 }
 
@@ -147,7 +150,8 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
   memory.detail = detailOf(plane);
   if (plane.releasing && memory.releaseBegin < 0) memory.releaseBegin = now;
   const double left = remainingShare(memory.releaseBegin, plane.owner.get(), now);
-  memory.belowCrest = plane.textureWavelength > 0 && -depth_m * unitsPerMetre < plane.textureAmplitude;
+  const double crest = std::min(plane.textureAmplitude, scene::kHighestDetail_m * unitsPerMetre);
+  memory.belowCrest = plane.textureWavelength > 0 && -depth_m * unitsPerMetre < crest;
   if (left == 0 || memory.leftOut) return false;
   placed.share = left;
   placed.surface.damping_Ns_per_m *= left;

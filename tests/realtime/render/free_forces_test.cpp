@@ -417,6 +417,37 @@ TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
   }
 }
 
+// A client that takes them for millimetres, or sends what it never set: the plane does not lift the hand
+// across the workspace.
+TEST_P(FreeForcesTest, texture_and_buzz_raise_the_plane_by_at_most_10_mm) {
+  constexpr double kPressed_m = 0.001;
+  for (const double amplitude_m : {0.011, 0.5, 1e15, 1e27}) {
+    SCOPED_TRACE(amplitude_m);
+    scene::Plane p = floor(0);
+    scene.planes = {p};
+    start({0, 0, 0.001});
+    to({0, 0, -kPressed_m});
+    p.textureAmplitude = units() * amplitude_m;
+    p.textureWavelength = units() * 1e6;
+    scene.planes = {p};
+    hand->show(scene.snapshot());
+    EXPECT_NEAR(at({0, 0, -kPressed_m}).force_N.z(), 1000 * (0.010 + kPressed_m), 1e-3);
+    EXPECT_NEAR(at({0.001, 0, -kPressed_m}).force_N.z(), 1000 * (0.010 + kPressed_m), 1e-3);
+    EXPECT_TRUE(hand->now().proxy_m.allFinite());
+    EXPECT_NEAR(to({0.001, 0, 0.011}).force_N.z(), 0, 1e-6) << "above the crest";
+    p.textureAmplitude = p.textureWavelength = 0;
+    p.buzzAmplitude = units() * amplitude_m;
+    p.buzzAngularFrequency_rad_per_s = 300;
+    scene.planes = {p};
+    start({0, 0, 0.012});
+    to({0, 0, 0});
+    double most_N = 0;
+    for (int i = 0; i < 100; ++i) most_N = std::max(most_N, at({0, 0, 0}).force_N.z());
+    EXPECT_NEAR(most_N, 10, 0.1);
+    EXPECT_TRUE(hand->now().proxy_m.allFinite());
+  }
+}
+
 // A view that moves, streamed at 60 Hz, with a hand that moves with it: in the world nothing moves.
 TEST_P(FreeForcesTest, what_holds_the_hand_moves_with_the_view) {
   for (const char* const what : {"friction", "adhesion", "texture", "friction effect", "corner"}) {
