@@ -92,6 +92,9 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
         assert to_world.shape == (3, 4) and np.allclose(to_world[:, :3], 1000 * np.eye(3))
         assert ticks["guard_counts"].shape == (len(ticks), 17)
         assert ticks.to_array(["tick", "force_N"]).dtype["force_N"].shape == (3,)
+        assert np.array_equal(ticks.to_array("force_N")["force_N"], ticks["force_N"])  # one name is one column
+        with pytest.raises(KeyError, match="no column 'forces'; there are time_ns"):
+            ticks.to_array("forces")
         with pytest.raises(KeyError, match="no column 'forces'; there are time_ns"):
             ticks["forces"]
         with pytest.raises(KeyError, match="no device 'Omni'.*there is Phantom"):
