@@ -393,6 +393,9 @@ class Session:
             if at + _HEAD.size > size:
                 self._damage = f"the block at byte {at} is cut"
                 return
+            if data[at : at + len(_MAGIC)] == _MAGIC:
+                self._damage = f"another recording begins at byte {at}"
+                return
             kind, length, check = unpack(data, at)
             start = at + _HEAD.size
             if start + length > size:

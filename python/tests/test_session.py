@@ -280,6 +280,9 @@ def test_damage_is_named_and_everything_before_it_is_read(tmp_path: pathlib.Path
         assert re.fullmatch(r"the block at byte \d+ is cut; everything before it was read", cut.remark)
         assert 0 < len(list(cut.commands()))
         cut.ticks["force_N"]
+    file.write_bytes(data + data)
+    with hapticd.Session(file) as joined:
+        assert joined.remark == f"another recording begins at byte {len(data)}; everything before it was read"
     broken = bytearray(data)
     broken[len(data) // 2] ^= 1
     file.write_bytes(broken)
