@@ -2,11 +2,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 namespace hapticd::apps {
 
@@ -20,10 +22,28 @@ inline CLI::Validator within(double least, double most) {
   return CLI::Validator(
       [least, most, range = range.str()](std::string& text) {
         double value = std::nan("");
-        if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) return std::string();
+        const bool hexadecimal = text.find_first_of("xX") != std::string::npos;
+        if (!hexadecimal && CLI::detail::lexical_cast(text, value) && value >= least && value <= most)
+          return std::string();
         return "must be a number from " + range + ", got '" + text + "'";
       },
       range.str());
+}
+/// Accepts an integer from `least`, at least 0, to `most` in decimal digits. CLI11 takes 0x10 for 16 and 010
+/// for 8.
+inline CLI::Validator withinIntegers(int least, int most) {
+  const std::string range = std::to_string(least) + " to " + std::to_string(most);
+  return CLI::Validator(
+      [least, most, range](std::string& text) {
+        int value = -1;
+        const char* const end = text.data() + text.size();
+        const auto [rest, error] = std::from_chars(text.data(), end, value);
+        const bool zeros = text.size() > 1 && text[0] == '0';
+        if (error == std::errc() && rest == end && !zeros && value >= least && value <= most)
+          return std::string();
+        return "must be an integer from " + range + " without leading zeros, got '" + text + "'";
+      },
+      range);
 }
 /// Refuses a text without characters, which would otherwise mean what a missing option means.
 inline CLI::Validator notEmpty() {

@@ -44,7 +44,7 @@ void addDevices(CLI::App& app) {
       ->check(notEmpty())
       ->capture_default_str();
   command->add_option("--haply-port", options->haplyPort, "Port of the Haply service")
-      ->check(CLI::Range(1, 65535))
+      ->check(withinIntegers(1, 65535))
       ->capture_default_str();
   command->add_flag("--json", *json, kJsonText);
   command->footer(

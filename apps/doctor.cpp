@@ -238,7 +238,7 @@ void addDoctor(CLI::App& app) {
       ->check(within(0.1, 3600))
       ->capture_default_str();
   command->add_option("--port", options->port, "TCP and UDP port to check")
-      ->check(CLI::Range(1, 65535))
+      ->check(withinIntegers(1, 65535))
       ->capture_default_str();
   command->footer("Exit status: 0 when ready, 1 when a problem must be fixed first.");
   command->add_flag("--json", options->json, kJsonText);

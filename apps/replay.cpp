@@ -61,7 +61,8 @@ void addReplay(CLI::App& app) {
   command->add_flag("--loop", options->replay.loop, "Start again at the end, until a signal");
   command->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883]")
       ->check(notEmpty());
-  command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
+  command->add_option("--port", options->port, "Only the port; 0: any free one")
+      ->check(withinIntegers(0, 65535));
   command
       ->add_option("--http", options->http,
                    "ADDR:PORT of the viewer's page, or 'off' [127.0.0.1:8080, if free]")

@@ -254,7 +254,8 @@ void addServe(CLI::App& app) {
       ->add_option("--listen", options->listen,
                    "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks")
       ->check(notEmpty());
-  command->add_option("--port", options->port, "Only the port; 0: any free one")->check(CLI::Range(0, 65535));
+  command->add_option("--port", options->port, "Only the port; 0: any free one")
+      ->check(withinIntegers(0, 65535));
   command
       ->add_option("--http", options->http,
                    "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"

@@ -213,7 +213,7 @@ void addTouch(CLI::App& app) {
       ->check(share)
       ->capture_default_str();
   command->add_option("--object", options->object, "Number of the object that gets the mesh")
-      ->check(CLI::Range(0, kLastObject))
+      ->check(withinIntegers(0, kLastObject))
       ->capture_default_str();
   command
       ->add_option("--size-mm", options->size_mm, "Largest extent on the device in mm; 0: fit a small device")

@@ -220,7 +220,7 @@ void addTunnel(CLI::App& app) {
       app.add_subcommand("tunnel", "Carry clients on this machine to a server on another one, through TLS");
   command->add_option("server", options->server, "HOST[:PORT], or unix:/PATH on this machine")->required();
   command->add_option("--port", options->port, "Local port [3883]; 0: any free one")
-      ->check(CLI::Range(0, 65535));
+      ->check(withinIntegers(0, 65535));
   CLI::Option* const known =
       command->add_option("--fingerprint", options->fingerprint,
                           "SHA-256 of the server's certificate, which it prints at its start");

@@ -200,6 +200,10 @@ def sphere(radius: float, center: Numbers = (0.0, 0.0, 0.0), rings: int = 32) ->
     """A sphere as (vertices (n, 3), triangles (m, 3)) for upload_mesh(), in world units."""
     if rings < 3:
         raise ValueError(f"a sphere of {rings} rings: give at least 3")
+    if not 0 < radius < np.inf:
+        raise ValueError(f"a sphere of radius {radius}: give a number above 0")
+    if np.shape(center) != (3,) or not np.isfinite(center).all():
+        raise ValueError(f"a sphere around {center}: give x, y and z")
     segments = 2 * rings
     polar = np.linspace(0, np.pi, rings + 1)[1:-1]
     around = np.arange(segments) * (2 * np.pi / segments)

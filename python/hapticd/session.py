@@ -204,6 +204,11 @@ class Lost(NamedTuple):
     count: int  # type: ignore[assignment]
 
 
+def _names(columns: Union[str, Sequence[str]]) -> Sequence[str]:
+    """A text is the name of one column, not a list of its letters."""
+    return (columns,) if isinstance(columns, str) else columns
+
+
 class Ticks:
     """The ticks of one device, column by column: ticks["force_N"] is an array of n rows, read from the file at the
     first use and kept. Lengths in metres, forces in newtons, in the device's frame. `columns` names all columns; those
@@ -283,20 +288,21 @@ class Ticks:
         opening[gripper] = self._session._gather(at[gripper], np.dtype(">f8"))
         return opening
 
-    def to_array(self, columns: Sequence[str]) -> "npt.NDArray[Any]":
-        """The columns as one structured array."""
-        arrays = {name: self[name] for name in columns}
+    def to_array(self, columns: Union[str, Sequence[str]]) -> "npt.NDArray[Any]":
+        """The columns as one structured array; the name of one column is that column."""
+        arrays = {name: self[name] for name in _names(columns)}
         table = np.empty(len(self), dtype=[(name, a.dtype, a.shape[1:]) for name, a in arrays.items()])
         for name, array in arrays.items():
             table[name] = array
         return table
 
-    def to_pandas(self, columns: Optional[Sequence[str]] = None) -> Any:
-        """A DataFrame with time_ns as index; vectors become columns such as force_N_x. Needs pandas."""
+    def to_pandas(self, columns: Union[str, Sequence[str], None] = None) -> Any:
+        """A DataFrame with time_ns as index; vectors become columns such as force_N_x; the name of one column is that
+        column. Needs pandas."""
         import pandas  # type: ignore[import]
 
         table: Dict[str, Any] = {}
-        for name in columns or ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons"):
+        for name in _names(columns or ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons")):
             array = self[name]
             if array.ndim == 1:
                 table[name] = array
@@ -386,6 +392,9 @@ class Session:
         while at < size:
             if at + _HEAD.size > size:
                 self._damage = f"the block at byte {at} is cut"
+                return
+            if data[at : at + len(_MAGIC)] == _MAGIC:
+                self._damage = f"another recording begins at byte {at}"
                 return
             kind, length, check = unpack(data, at)
             start = at + _HEAD.size

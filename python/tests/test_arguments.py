@@ -106,6 +106,18 @@ def test_fields_of_values_are_checked_one_by_one(hand: hapticd.Client) -> None:
         hand.subscribe("tick")  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("radius", [float("nan"), float("inf"), -20, 0])
+def test_a_sphere_without_a_radius_is_refused(radius: float) -> None:
+    with pytest.raises(ValueError, match=f"^a sphere of radius {radius}: give a number above 0$"):
+        hapticd.sphere(radius)
+
+
+@pytest.mark.parametrize("center", [(0, float("nan"), 0), (0, 0, float("inf")), (1, 2), 3])
+def test_a_sphere_around_no_point_is_refused(center: Any) -> None:
+    with pytest.raises(ValueError, match=f"^a sphere around {re.escape(str(center))}: give x, y and z$"):
+        hapticd.sphere(20, center)
+
+
 def test_meshes_of_what_is_no_number_are_refused(hand: hapticd.Client) -> None:
     vertices, triangles = hapticd.sphere(20)
     for wrong, text in (

@@ -92,6 +92,9 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
         assert to_world.shape == (3, 4) and np.allclose(to_world[:, :3], 1000 * np.eye(3))
         assert ticks["guard_counts"].shape == (len(ticks), 17)
         assert ticks.to_array(["tick", "force_N"]).dtype["force_N"].shape == (3,)
+        assert np.array_equal(ticks.to_array("force_N")["force_N"], ticks["force_N"])  # one name is one column
+        with pytest.raises(KeyError, match="no column 'forces'; there are time_ns"):
+            ticks.to_array("forces")
         with pytest.raises(KeyError, match="no column 'forces'; there are time_ns"):
             ticks["forces"]
         with pytest.raises(KeyError, match="no device 'Omni'.*there is Phantom"):
@@ -277,6 +280,9 @@ def test_damage_is_named_and_everything_before_it_is_read(tmp_path: pathlib.Path
         assert re.fullmatch(r"the block at byte \d+ is cut; everything before it was read", cut.remark)
         assert 0 < len(list(cut.commands()))
         cut.ticks["force_N"]
+    file.write_bytes(data + data)
+    with hapticd.Session(file) as joined:
+        assert joined.remark == f"another recording begins at byte {len(data)}; everything before it was read"
     broken = bytearray(data)
     broken[len(data) // 2] ^= 1
     file.write_bytes(broken)

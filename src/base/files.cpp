@@ -97,7 +97,15 @@ std::unique_ptr<InputFile> SystemFiles::open(const std::filesystem::path& path) 
 }
 
 std::unique_ptr<OutputFile> SystemFiles::create(const std::filesystem::path& path, Existing existing) {
-  return std::make_unique<SystemOutputFile>(path, existing == Existing::refuse ? O_EXCL : O_TRUNC);
+  try {
+    return std::make_unique<SystemOutputFile>(path, existing == Existing::refuse ? O_EXCL : O_TRUNC);
+  } catch (const std::system_error& error) {
+    // Of whatever is there, the kernel says EEXIST.
+    std::error_code none;
+    if (error.code() == std::errc::file_exists && std::filesystem::is_directory(path, none))
+      fail(EISDIR, "cannot open", path);
+    throw;
+  }
 }
 
 std::vector<std::byte> SystemFiles::read(const std::filesystem::path& path) {

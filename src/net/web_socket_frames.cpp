@@ -155,11 +155,13 @@ Buffer webSocketFrame(WebSocketOpcode opcode, std::span<const std::byte> payload
 
 Buffer webSocketClose(std::uint16_t code, std::string_view reason) {
   constexpr std::size_t kLongestReason = 123;
+  constexpr std::string_view kCut = "...";
+  std::string cut;
   if (reason.size() > kLongestReason) {
-    std::size_t size = kLongestReason;
+    std::size_t size = kLongestReason - kCut.size();
     const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
     while (size > 0 && continues(reason[size])) --size;  // no character is cut in two
-    reason = reason.substr(0, size);
+    reason = cut.append(reason, 0, size).append(kCut);
   }
   Buffer payload{static_cast<std::byte>(code >> 8), static_cast<std::byte>(code & 0xff)};
   const auto bytes = std::as_bytes(std::span(reason.data(), reason.size()));

@@ -75,6 +75,7 @@ std::string BlockReader::read(Block& block, const std::string& where) {
   std::array<std::byte, kBlockHeadBytes> head{};
   if (rest < kBlockHeadBytes || file_->read(head) != kBlockHeadBytes)
     return "the file is cut within a block" + where;
+  if (std::memcmp(head.data(), kMagic, kMagicBytes) == 0) return "another recording begins" + where;
   const auto length = wire::loadBig<std::uint32_t>(head.data() + 4);
   if (length > rest - kBlockHeadBytes)
     return "the file is cut within a block" + where + ", or the length of the block is damaged";

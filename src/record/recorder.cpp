@@ -26,6 +26,7 @@ Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const Record
   } catch (const std::system_error& error) {
     const std::string what = "cannot record to '" + path_.string() + "': " + error.code().message();
     if (error.code() == std::errc::file_exists) throw RecordingExists(what + "; name another");
+    if (error.code() == std::errc::is_a_directory) throw RecordingExists(what + "; name a file");
     throw RecordingError(what + "; name a file in a directory that can be written");
   }
 }

@@ -52,7 +52,8 @@ class Recorder {
   /// Called in the recorder's thread with a text for the log.
   using OnProblem = std::function<void(RecorderProblem, const std::string&)>;
 
-  /// Creates the file. Throws RecordingExists when it exists, and RecordingError when it cannot be created.
+  /// Creates the file. Throws RecordingExists when it or a directory exists, and RecordingError when it
+  /// cannot be created.
   Recorder(std::filesystem::path file, OnProblem onProblem, const RecorderOptions& options = {});
   ~Recorder() { finish(); }
   Recorder(const Recorder&) = delete;

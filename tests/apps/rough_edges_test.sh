@@ -28,14 +28,20 @@ refused 2 "hapticd serve: unexpected argument 'first'; 'hapticd serve --help'" "
 refused 2 "hapticd watch: unexpected argument 'third'; 'hapticd watch --help'" "$hapticd" watch Phantom@localhost third fourth
 refused 2 "hapticd serve: --port needs a value; 'hapticd serve --help'" "$hapticd" serve --port
 refused 2 "hapticd serve: --port is given more than once; 'hapticd serve --help'" "$hapticd" serve --port 1 --port 2
-refused 2 "hapticd serve: --port: Value x not in range 0 to 65535; 'hapticd serve --help'" "$hapticd" serve --port x
+refused 2 "hapticd serve: --port: must be an integer from 0 to 65535 without leading zeros, got 'x'; 'hapticd serve --help'" "$hapticd" serve --port x
+for number in 0x10 010 1e3 -1 65536 4294967297 99999999999999999999 1.5 ' 1' '1 '; do
+  refused 2 "must be an integer from 0 to 65535 without leading zeros, got '$number'" "$hapticd" serve "--port=$number"
+done
+for number in 0x10 0X1p3 nan inf -1 1e10; do
+  refused 2 "must be a number from 0 to 1e+09, got '$number'" "$hapticd" serve "--seconds=$number"
+done
 refused 2 "hapticd bench: there is no benchmark 'xyzzyx'; hapticd bench --list" "$hapticd" bench xyzzyx
 refused 2 "hapticd bench: The following argument was not expected: --nothing-alike; 'hapticd bench --help'" "$hapticd" bench --nothing-alike
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 2 "excludes" "$hapticd" record Phantom@localhost --server --end --seconds 5
-refused 2 "not in range 0 to 2147483646" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --object 2147483647
-refused 2 "not in range 1 to 65535" "$hapticd" doctor --port 70000
+refused 2 "must be an integer from 0 to 2147483646" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --object 2147483647
+refused 2 "must be an integer from 1 to 65535" "$hapticd" doctor --port 70000
 refused 1 "--mesh does not go with --session" "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --session "$source_dir/testdata/recordings/all_commands_law2.haptics"
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list

@@ -245,7 +245,7 @@ std::shared_ptr<const FakeFiles::Content> FakeFiles::find(const std::filesystem:
 std::unique_ptr<OutputFile> FakeFiles::create(const std::filesystem::path& path, Existing existing) {
   const std::string key = keyOf(path);
   if (failures.open != 0) fail(failures.open, "cannot open", path);
-  if (folders_.contains(key)) fail(existing == Existing::refuse ? EEXIST : EISDIR, "cannot open", path);
+  if (folders_.contains(key)) fail(EISDIR, "cannot open", path);
   if (!folders_.contains(keyOf(std::filesystem::path(key).parent_path()))) fail(ENOENT, "cannot open", path);
   std::shared_ptr<Content>& content = files_[key];
   if (content != nullptr && existing == Existing::refuse) fail(EEXIST, "cannot open", path);

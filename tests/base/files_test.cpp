@@ -127,6 +127,7 @@ TYPED_TEST(FilesTest, NamesThePathOfWhatIsAbsent) {
   expectError([&] { this->files.create(lost, Existing::replace); }, ENOENT, lost);
   expectError([&] { this->files.rename(this->a, this->b); }, ENOENT, this->a);
   expectError([&] { this->files.create(this->folder, Existing::replace); }, EISDIR, this->folder);
+  expectError([&] { this->files.create(this->folder, Existing::refuse); }, EISDIR, this->folder);
   expectError([&] { this->files.read(this->folder); }, EISDIR, this->folder);
 }
 

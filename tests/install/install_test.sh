@@ -22,6 +22,23 @@ fi
   -DCMAKE_CXX_COMPILER="$compiler" -DEXAMPLES="$source_dir/examples" >"$work/user.log" || { cat "$work/user.log"; exit 1; }
 "$cmake" --build "$work/user" --parallel 2
 
+# A component that does not exist is refused by its name; without components the package is found as with them.
+mkdir "$work/asks"
+for asked in "" "COMPONENTS rigid_bodies"; do
+  printf '%s\n' 'cmake_minimum_required(VERSION 3.22)' 'project(asks LANGUAGES CXX)' "find_package(hapticd REQUIRED $asked)" \
+    'get_target_property(type hapticd::vrpn TYPE)' >"$work/asks/CMakeLists.txt"
+  found=yes
+  "$cmake" -G Ninja -S "$work/asks" -B "$work/asks/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_COMPILER="$compiler" \
+    >"$work/asks.log" 2>&1 || found=no
+  case "$found $asked" in
+    "yes ") ;;
+    "no COMPONENTS rigid_bodies")
+      tr -s ' \n' ' ' <"$work/asks.log" | grep -qF "hapticd has no component 'rigid_bodies'; there are client, client_shared and vrpn" ||
+        { cat "$work/asks.log"; exit 1; } ;;
+    *) cat "$work/asks.log"; exit 1 ;;
+  esac
+done
+
 # A project that adds the tree instead gets the same target; C++20 comes with it.
 mkdir "$work/adds"
 cp "$source_dir/tests/install/user/reads_force.cpp" "$work/adds"

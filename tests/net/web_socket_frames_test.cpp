@@ -210,11 +210,20 @@ TEST(WebSocketFrames, AClosingFrameHoldsWhatFits) {
   EXPECT_EQ(textOf(webSocketClose(1000, "bye")),
             "\x88\x05\x03\xe8"
             "bye"s);
-  EXPECT_EQ(webSocketClose(1000, std::string(500, 'x')).size(), 127u);
+  EXPECT_EQ(webSocketClose(1000, std::string(123, 'x')), [] {
+    Buffer frame = webSocketFrame(WebSocketOpcode::close, Buffer(125, std::byte{'x'}));
+    frame[2] = std::byte{3};
+    frame[3] = std::byte{0xe8};
+    return frame;
+  }());
+  const std::string cut = textOf(webSocketClose(1000, std::string(124, 'x')));
+  EXPECT_EQ(cut.size(), 127u);
+  EXPECT_EQ(cut.substr(120), "xxxx...") << "who reads it knows that there was more";
   // Two bytes for each letter: half a letter would make the whole frame invalid.
   std::string umlauts;
   for (int i = 0; i < 100; ++i) umlauts += "\xc3\xa4";
-  EXPECT_EQ(webSocketClose(1000, umlauts).size(), 2u + 2u + 122u);
+  EXPECT_EQ(textOf(webSocketClose(1000, umlauts)).substr(4), umlauts.substr(0, 120) + "...");
+  EXPECT_EQ(textOf(webSocketClose(1000, 'x' + umlauts)).substr(4), 'x' + umlauts.substr(0, 118) + "...");
 }
 
 }  // namespace

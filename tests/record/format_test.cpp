@@ -469,6 +469,14 @@ TEST_F(SmallSession, ADamagedByteIsReportedAtItsBlock) {
   }
 }
 
+TEST_F(SmallSession, AnotherOneBehindItIsNamed) {
+  const std::string whole = bytes_;
+  const auto [events, remark] = read(whole + whole);
+  EXPECT_EQ(events, read(whole).first);
+  EXPECT_EQ(remark, "another recording begins at byte " + std::to_string(whole.size()) + " of " +
+                        std::to_string(2 * whole.size()) + "; everything before it was read");
+}
+
 TEST_F(SmallSession, NewerVersionsAndOtherFilesAreRefused) {
   Bytes file(magic().begin(), magic().end());
   appendBlock(file, BlockKind::header, packed(kFormatVersion + 1));

@@ -74,6 +74,7 @@ TEST(Recorder, AFileThatCannotBeCreatedIsRefusedAtOnce) {
   std::string kept;
   in >> kept;
   EXPECT_EQ(kept, "precious");
+  EXPECT_NE(openError(file.path().parent_path()).find("Is a directory; name a file"), std::string::npos);
 }
 
 TEST(Recorder, TicksOfAFullRingAreCountedInTheLogAndInTheFile) {

@@ -131,7 +131,8 @@ Commands parseCommands(std::string_view text) {
       }
     }
   } catch (const Json::exception& error) {
-    throw MessageError(error.what());
+    const std::string what = error.what();  // "[json.exception.NAME] TEXT"
+    throw MessageError(what.substr(what.find("] ") + 2));
   }
   return commands;
 }

@@ -67,6 +67,16 @@ void deleteOldest(const fs::path& newest, int keep, std::uint64_t bytes) {
   }
 }
 
+// A file without ticks, of a full disk, would later take the place of an older one that has some.
+void deleteEmpty(const fs::path& file) {
+  base::Files& files = base::world().files;
+  try {
+    if (files.open(file)->size() == 0) files.remove(file);
+  } catch (const std::exception&) {
+    // It could not even be created.
+  }
+}
+
 }  // namespace
 
 void writeBlackBox(const fs::path& file, const std::string& device, const std::vector<TickReport>& ticks) {
@@ -113,6 +123,7 @@ void BlackBoxRecorder::poll() {
         } catch (const std::exception& error) {
           spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
                         error.what());
+          deleteEmpty(file);
         }
         writes_.store(false, std::memory_order_release);
         return std::nullopt;

@@ -115,5 +115,21 @@ TEST(HaplyCommands, RefuseWhatIsNoCommand) {
   }
 }
 
+// The client reads the beginning only, where the JSON library would write its own name.
+TEST(HaplyCommands, SayFirstWhatIsWrong) {
+  const auto refusal = [](const char* text) -> std::string {
+    try {
+      parseCommands(text);
+    } catch (const MessageError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal("{\"inverse3\":").find("parse error at line 1, column 13: "), 0U);
+  EXPECT_EQ(refusal(R"({"inverse3":[{"commands":{}}]})"), "key 'device_id' not found");
+  EXPECT_EQ(refusal(R"({"inverse3":[{"device_id":7}]})"), "type must be string, but is number");
+  EXPECT_EQ(refusal("3"), "a message must be a JSON object");
+}
+
 }  // namespace
 }  // namespace hapticd::server::haply

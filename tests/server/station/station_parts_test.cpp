@@ -8,6 +8,7 @@
 #include <string_view>
 #include <thread>
 
+#include "base/fake_world.h"
 #include "base/time.h"
 #include "base/world.h"
 #include "device/simulated/simulated_device.h"
@@ -521,6 +522,21 @@ TEST_F(BlackBoxFilesTest, KeepsTheNewestWithinTheirBytes) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     EXPECT_EQ(files().size(), 1U) << "the newest stays whatever its size";
   }
+}
+
+// Where room is made later, one would push out an older file that has ticks.
+TEST_F(BlackBoxFilesTest, AFullDiskLeavesNoFileWithoutTicks) {
+  base::FakeFiles files_;
+  files_.freeBytes = 0;
+  const base::World& world = base::world();
+  const base::ScopedWorld scoped({world.clock, world.threads, files_, world.random});
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom", {"/boxes", 2}, box);
+  fail(box, 2);
+  recorder.poll();
+  recorder.finish();
+  EXPECT_FALSE(box.frozen());
+  EXPECT_EQ(files_.list("/boxes/Phantom"), std::vector<std::string>{});
 }
 
 TEST_F(BlackBoxFilesTest, ADiskThatHangsHoldsNobodyUp) {
