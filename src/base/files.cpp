@@ -40,7 +40,9 @@ class Descriptor {
 
 class SystemOutputFile final : public OutputFile {
  public:
-  SystemOutputFile(const std::filesystem::path& path, int flags) : file_(path, O_WRONLY | O_CREAT | flags) {}
+  // Appends, so that a file that another program cut short stays too short.
+  SystemOutputFile(const std::filesystem::path& path, int flags)
+      : file_(path, O_WRONLY | O_CREAT | O_APPEND | flags) {}
 
   void write(std::span<const std::byte> bytes) override {
     while (!bytes.empty()) {
@@ -48,6 +50,7 @@ class SystemOutputFile final : public OutputFile {
       if (written < 0 && errno == EINTR) continue;
       if (written < 0) fail(errno, "cannot write", file_.path());
       bytes = bytes.subspan(static_cast<std::size_t>(written));
+      written_ += written;
     }
   }
 
@@ -57,11 +60,13 @@ class SystemOutputFile final : public OutputFile {
 
   bool isGone() const noexcept override {
     struct stat status {};
-    return ::fstat(file_.fd(), &status) == 0 && status.st_nlink == 0;
+    if (::fstat(file_.fd(), &status) != 0) return false;
+    return status.st_nlink == 0 || (S_ISREG(status.st_mode) && status.st_size < written_);
   }
 
  private:
   Descriptor file_;
+  off_t written_ = 0;
 };
 
 // Reads until the span is full or the file ends.

@@ -178,11 +178,16 @@ void Recorder::drain() {
   reportLosses();
 }
 
-// A file that was removed can be written and is lost.
+// A file that was removed can be written and is lost; so is one that was emptied.
 void Recorder::lookForFile() {
   if (!file_ || base::now() < nextLook_) return;
   nextLook_ = base::now() + kBetweenLooks;
-  if (file_->isGone()) fail(std::make_error_code(std::errc::no_such_file_or_directory));
+  if (!file_->isGone()) return;
+  endFile();
+  onProblem_(RecorderProblem::stopped,
+             "recording to '" + path_.string() +
+                 "' has stopped: another program removed the file, or cut it short; what was "
+                 "written is lost; start a new recording");
 }
 
 void Recorder::reportLosses() {

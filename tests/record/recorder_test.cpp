@@ -150,12 +150,26 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   recorder.start(0, "");
   EXPECT_TRUE(recorder.writes());
   std::filesystem::remove(file.path());
-  EXPECT_TRUE(
-      problems.until("stopped: recording to '" + file.path().string() + "' has stopped: No such file"));
+  EXPECT_TRUE(problems.until("stopped: recording to '" + file.path().string() +
+                             "' has stopped: another program removed the file"));
   EXPECT_FALSE(recorder.writes());
   recorder.ring(0).push(realtime::TickRecord());
   recorder.finish();
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
+}
+
+TEST(Recorder, AFileThatIsEmptiedEndsTheRecording) {
+  RecordingFile file;
+  Problems problems;
+  Recorder recorder(file.path(), problems.listener());
+  recorder.addDevice(phantom());
+  recorder.start(0, "");
+  std::filesystem::resize_file(file.path(), 0);
+  recorder.ring(0).push(realtime::TickRecord());
+  EXPECT_TRUE(problems.until("stopped: recording to '" + file.path().string() +
+                             "' has stopped: another program removed the file, or cut it short"));
+  EXPECT_FALSE(recorder.writes());
+  recorder.finish();
 }
 
 // It would be in the way of the next start, and hide why the first one failed.
