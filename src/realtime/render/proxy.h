@@ -261,7 +261,7 @@ class Proxy {
   bool commandChanged_ = false;
   double share_ = 1;
   bool released_ = false;           // contact released until the HIP leaves the surface
-  std::uint64_t missed_ = 0;        // objects whose sweep of this tick was not examined whole
+  std::uint64_t missed_ = 0;        // deforming objects whose sweep of this tick was not examined whole
   std::int32_t jumper_ = -1;        // id of the object that jumped and released it; -1: none
   Vec3 beforeJump_ = Vec3::Zero();  // where that found the proxy
   bool carriedByJump_ = false;      // in this tick

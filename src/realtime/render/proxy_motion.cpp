@@ -456,11 +456,7 @@ bool Proxy::pushByObjects(const Vec3& from, Pushers& pushers, std::uint32_t& sta
     const Vec3 start = object.carried(from);
     const Vec3 displacement = position_ - start;
     ObjectHit hit;
-    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit)) {
-      if (hit.unexamined) {
-        missed_ |= std::uint64_t{1} << i;
-        continue;
-      }
+    if (displacement.squaredNorm() > 0 && query_.castAtObject(i, start, position_, hit) && !hit.unexamined) {
       pushTo(start + hit.stop * displacement, hit.halfSpace, pushers);
       pushed = true;
       touchedObject_ = object.state->id;

@@ -3,13 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "base/time.h"
+#include "geometry/triangle_mesh.h"
 #include "realtime/render/renderer.h"
 #include "scene/builder.h"
 
@@ -49,23 +50,13 @@ inline std::vector<Vec3f> sheetTriples(double half, double height = 0) {
           Vec3f(-h, y, -h), Vec3f(h, y, h),  Vec3f(h, y, -h)};
 }
 
-/// A sphere around the origin, fronts outside, millimetres.
-inline std::vector<Vec3f> sphereTriples(double radius, int rings, int sectors) {
-  const auto at = [&](int ring, int sector) {
-    const double polar = M_PI * ring / rings;
-    const double around = 2 * M_PI * (sector % sectors) / sectors;
-    const Vec3 out(std::sin(polar) * std::sin(around), std::cos(polar), std::sin(polar) * std::cos(around));
-    return Vec3f((radius * out).cast<float>());
-  };
-  std::vector<Vec3f> triples;
-  for (int ring = 0; ring < rings; ++ring) {
-    for (int s = 0; s < sectors; ++s) {
-      if (ring > 0) triples.insert(triples.end(), {at(ring, s), at(ring + 1, s + 1), at(ring, s + 1)});
-      if (ring + 1 < rings)
-        triples.insert(triples.end(), {at(ring, s), at(ring + 1, s), at(ring + 1, s + 1)});
-    }
+/// The corners of all triangles.
+inline std::vector<Vec3f> triplesOf(const geometry::TriangleMesh& mesh) {
+  std::vector<Vec3f> corners;
+  for (const geometry::Triangle& t : mesh.triangles) {
+    for (const std::uint32_t vertex : t) corners.push_back(mesh.vertices[vertex]);
   }
-  return triples;
+  return corners;
 }
 
 class Loop {
