@@ -40,7 +40,7 @@ class Descriptor {
 
 class SystemOutputFile final : public OutputFile {
  public:
-  // Appends, so that a file that another program cut short stays too short.
+  // Appends, so that a file whose size another program changed keeps another size than what was written.
   SystemOutputFile(const std::filesystem::path& path, int flags)
       : file_(path, O_WRONLY | O_CREAT | O_APPEND | flags) {}
 
@@ -61,7 +61,7 @@ class SystemOutputFile final : public OutputFile {
   bool isGone() const noexcept override {
     struct stat status {};
     if (::fstat(file_.fd(), &status) != 0) return false;
-    return status.st_nlink == 0 || (S_ISREG(status.st_mode) && status.st_size < written_);
+    return status.st_nlink == 0 || (S_ISREG(status.st_mode) && status.st_size != written_);
   }
 
  private:

@@ -21,8 +21,8 @@ class OutputFile {
   virtual void write(std::span<const std::byte> bytes) = 0;
   /// Returns when all written bytes are on the disk.
   virtual void sync() = 0;
-  /// Whether it was removed, or cut short by another program: what is written is lost. A file that was
-  /// renamed is not. Does not throw.
+  /// Whether it was removed, or another program changed its size: what is written is lost, or follows other
+  /// bytes. A file that was renamed is not. Does not throw.
   virtual bool isGone() const noexcept = 0;
 
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }

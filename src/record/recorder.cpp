@@ -178,7 +178,7 @@ void Recorder::drain() {
   reportLosses();
 }
 
-// A file that was removed can be written and is lost; so is one that was emptied.
+// A file that was removed can be written and is lost; so is one that was emptied or replaced.
 void Recorder::lookForFile() {
   if (!file_ || base::now() < nextLook_) return;
   nextLook_ = base::now() + kBetweenLooks;
@@ -186,8 +186,8 @@ void Recorder::lookForFile() {
   endFile();
   onProblem_(RecorderProblem::stopped,
              "recording to '" + path_.string() +
-                 "' has stopped: another program removed the file, or cut it short; what was "
-                 "written is lost; start a new recording");
+                 "' has stopped: another program removed the file, or wrote to it; what was "
+                 "recorded is lost or damaged; start a new recording");
 }
 
 void Recorder::reportLosses() {

@@ -158,18 +158,22 @@ TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {
   EXPECT_EQ(recorder.counts().ticks, 0U) << "lost ticks were not recorded";
 }
 
-TEST(Recorder, AFileThatIsEmptiedEndsTheRecording) {
-  RecordingFile file;
-  Problems problems;
-  Recorder recorder(file.path(), problems.listener());
-  recorder.addDevice(phantom());
-  recorder.start(0, "");
-  std::filesystem::resize_file(file.path(), 0);
-  recorder.ring(0).push(realtime::TickRecord());
-  EXPECT_TRUE(problems.until("stopped: recording to '" + file.path().string() +
-                             "' has stopped: another program removed the file, or cut it short"));
-  EXPECT_FALSE(recorder.writes());
-  recorder.finish();
+// Emptied, or replaced by a larger one, as by 'cp'.
+TEST(Recorder, AFileThatAnotherProgramWritesToEndsTheRecording) {
+  for (const std::uintmax_t size : {0, 1'000'000}) {
+    RecordingFile file;
+    Problems problems;
+    Recorder recorder(file.path(), problems.listener());
+    recorder.addDevice(phantom());
+    recorder.start(0, "");
+    std::filesystem::resize_file(file.path(), size);
+    recorder.ring(0).push(realtime::TickRecord());
+    EXPECT_TRUE(problems.until("stopped: recording to '" + file.path().string() +
+                               "' has stopped: another program removed the file, or wrote to it"))
+        << size;
+    EXPECT_FALSE(recorder.writes());
+    recorder.finish();
+  }
 }
 
 // It would be in the way of the next start, and hide why the first one failed.
