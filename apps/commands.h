@@ -15,6 +15,12 @@ namespace hapticd::apps {
 /// Exit status of the process, set by the subcommand's callback.
 inline int exitCode = 0;
 
+/// Exit status of a command that read a recording as far as it goes, with this remark of its reader.
+inline int statusFor(const std::string& remark) {
+  constexpr int kNotWhole = 3;  // 1: there is no result
+  return remark.empty() ? 0 : kNotWhole;
+}
+
 /// Accepts a number from `least` to `most`. CLI11's own ranges accept NaN.
 inline CLI::Validator within(double least, double most) {
   std::ostringstream range;

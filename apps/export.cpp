@@ -118,7 +118,7 @@ int run(const ExportOptions& options) {
     std::fprintf(streams ? stderr : stdout, "wrote %s%s\n", options.out.c_str(),
                  beside.empty() ? "" : (" and " + beside).c_str());
   }
-  return 0;
+  return statusFor(remark);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -106,8 +107,9 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device, base:
 
 int run(const std::string& file, bool config, bool json) {
   if (json) {
-    std::fputs(record::sidecarOf(file).c_str(), stdout);
-    return 0;
+    const std::string text = record::sidecarOf(file);
+    std::fputs(text.c_str(), stdout);
+    return statusFor(nlohmann::json::parse(text).at("remark"));
   }
   record::RecordingReader reader(file);
   const record::RecordingHeader& header = reader.header();
@@ -126,7 +128,7 @@ int run(const std::string& file, bool config, bool json) {
     std::printf("marker      %.3f s: %s\n", base::toSeconds(marker.time - facts.first), marker.text.c_str());
   if (config) std::printf("\n%s", header.config.c_str());
   if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
-  return 0;
+  return statusFor(reader.remark());
 }
 
 }  // namespace

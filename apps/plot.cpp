@@ -44,6 +44,7 @@ struct Data {
   std::string title;
   std::vector<Row> rows;
   std::vector<Moment> moments;
+  std::string remark;  // why the recording is not whole
 };
 
 constexpr const char* kForce = "#c2410c";
@@ -106,7 +107,8 @@ Data read(const PlotOptions& options) {
     if (time_s >= data.rows.front().time_s && time_s <= data.rows.back().time_s)
       data.moments.push_back({time_s, text, false});
   }
-  if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
+  data.remark = reader.remark();
+  if (!data.remark.empty()) std::fprintf(stderr, "hapticd: %s\n", data.remark.c_str());
   return data;
 }
 
@@ -283,7 +285,7 @@ int run(const PlotOptions& options) {
   file.close();
   std::printf("%s: %zu ticks of '%s' from %.3f s to %.3f s\n", options.out.c_str(), data.rows.size(),
               data.device.c_str(), data.rows.front().time_s, data.rows.back().time_s);
-  return 0;
+  return statusFor(data.remark);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "commands.h"
 #include "record/difference.h"
 #include "record/export_file.h"
 #include "record/text_fields.h"
@@ -119,7 +120,7 @@ int renderSession(const RecordingRenderOptions& options) {
   std::string failure = nothingComparedIn(devices);
   // Another law gives other forces on purpose: the largest difference above is the result, not a failure.
   if (failure.empty() && options.changes.none() && law.empty()) failure = failureOf(devices);
-  if (failure.empty()) return 0;
+  if (failure.empty()) return statusFor(remark);
   std::fprintf(stderr, "hapticd: %s\n", failure.c_str());
   return 1;
 }

@@ -15,7 +15,7 @@ struct RecordingRenderOptions {
 };
 
 /// Prints the difference. Returns 1 when nothing was changed and the force law is the same but something
-/// differs, else 0.
+/// differs, else statusFor() the recording.
 int renderSession(const RecordingRenderOptions& options);
 
 }  // namespace hapticd::apps

@@ -119,6 +119,18 @@ refused 1 "cannot write '$work/nowhere/x.csv'" "$hapticd" render --session "$rec
 ! grep session "$work/said" || exit 1
 refused 1 "cannot write '$work/nowhere/x.svg'" "$hapticd" plot "$recording" --from 1000 --out "$work/nowhere/x.svg"
 
+# What is not whole is read as far as it goes, and a script can tell.
+"$hapticd" render --session "$recording" >/dev/null
+head -c -1 "$recording" >"$work/cut.haptics"
+refused 3 "everything before it was read" "$hapticd" info "$work/cut.haptics"
+refused 3 "everything before it was read" "$hapticd" info "$work/cut.haptics" --json
+refused 3 "everything before it was read" "$hapticd" render --session "$work/cut.haptics"
+refused 3 "everything before it was read" "$hapticd" plot "$work/cut.haptics" --out "$work/cut.svg"
+for to in csv mcap vrpn; do
+  refused 3 "everything before it was read" "$hapticd" export "$work/cut.haptics" --to $to -o "$work/cut.$to"
+  [ -s "$work/cut.$to" ]
+done
+
 "$hapticd" info "$recording" >"$work/info"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
   { cat "$work/info"; exit 1; }
