@@ -295,6 +295,7 @@ void Server::run() {
   realtime::requestShortTimeSlice();  // reports must not wait for other processes
   loop_.run();
   if (player_) player_->stop();
+  for (const auto& [id, session] : sessions_) session->reportLost();
   for (const auto& station : stations_) station->stopForces();  // one that ends slowly delays no other's stop
   for (const auto& station : stations_) station->stop();
   devicesClosed_.store(true, std::memory_order_release);

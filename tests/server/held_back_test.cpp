@@ -238,6 +238,36 @@ TEST_F(HeldBackTest, ARearmThatArrivesWhileTheServerEndsItsClientIsRefusedAloud)
   EXPECT_TRUE(stopped());
 }
 
+// A marker that is not in the recording, and a recording that does not end, are not missed in silence.
+TEST_F(HeldBackTest, OrdersThatAreHeldBackWhenTheServerEndsTheirClientAreInTheLog) {
+  for (const bool serverEnds : {false, true}) {
+    auto client = peer();
+    closeScene();
+    flood(*client, 11 * kMiB);  // the queue takes 8 MiB, the session holds the rest
+    client->queue(wire::Marker{.text = "trial 3"});
+    client->queue(wire::Marker{.text = "trial 4"});
+    client->queue(wire::RecordingControl{.record = 0, .name = {}});
+    client->send(wire::Ping{});  // overtakes: the server has read all when it answers
+    ASSERT_TRUE(client->untilNext<wire::Pong>());
+    if (serverEnds) {
+      server_->server().stop();
+    } else {
+      client->sendPayload(wire::kindOf<wire::Heartbeat>, {});  // overtakes, and is malformed
+    }
+    const std::size_t lines = serverEnds ? 2 : 1;
+    EXPECT_TRUE(watcher_->until(
+        [&] {
+          client->poll();
+          return lines_.count("2 hapticd Marker") == lines &&
+                 lines_.count("1 hapticd Recording_Control") == lines;
+        },
+        60s))
+        << lines_.text();
+    openScene();
+    gate_ = std::make_shared<std::latch>(1);
+  }
+}
+
 // Where nothing is stopped or latched, nothing is lost.
 TEST_F(HeldBackTest, ARearmOfAClientThatLeftIsNoNewsWhereNothingIsStopped) {
   auto client = peer();

@@ -158,11 +158,20 @@ void Session::onEnd(const std::string& reason) {
 
 // What is still held back is not handled.
 void Session::closed(const std::string& reason) {
-  while (!backlog_.empty()) noteLost(backlog_.pop().message);
+  reportLost();
   owner_.onClosed(*this, reason);
 }
 
+void Session::reportLost() {
+  while (!backlog_.empty()) noteLost(backlog_.pop().message);
+  std::string text;
+  for (const auto& [kind, count] : std::exchange(lost_, {}))
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, wire::info(kind).name);
+  if (!text.empty()) logWarning("(" + description_ + ") is gone before these were carried out: " + text);
+}
+
 void Session::noteLost(const wire::MessageReceived& message) {
+  if (!wire::overtakes(message.kind)) ++lost_[message.kind];
   if (message.kind == wire::kindOf<wire::RearmForces>) lostRearms_.insert(message.local_sender);
 }
 

@@ -149,6 +149,8 @@ class Session {
   /// The devices whose re-arm the session has not passed on, because the server ended the connection. Whole
   /// in onClosed().
   const std::set<wire::LocalSender>& lostRearms() const noexcept { return lostRearms_; }
+  /// Before the server ends: logs the messages that are still held back, and are not passed on any more.
+  void reportLost();
   /// Checks the client's heartbeats.
   HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
   /// The server itself stood still until `now`: silence counts from here.
@@ -222,6 +224,7 @@ class Session {
   std::optional<std::string> closeReason_;  // set when the connection closed before the backlog was empty
   MessageBacklog backlog_;
   std::set<wire::LocalSender> lostRearms_;
+  std::map<wire::MessageKind, std::uint64_t> lost_;  // not passed on, besides those that act for a moment
   HeartbeatWatch heartbeats_;
   std::array<wire::Time, wire::kMessageKinds>
       lastReliable_{};  // newest reliable message of each kind, client's clock
