@@ -1,12 +1,16 @@
 // hapticd-bench: measures hapticd against yardsticks in the same minutes. `hapticd bench` runs it.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "bench/helpers.h"
@@ -39,6 +43,22 @@ std::vector<const Benchmark*> chosen(const std::vector<std::string>& names) {
   return result;
 }
 
+// Before the measurement, which may take an hour.
+void requireFolder(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory / "figures", error);
+  if (!error && ::access(directory.c_str(), W_OK | X_OK) != 0) error = {errno, std::generic_category()};
+  if (error)
+    throw std::runtime_error("cannot write to '" + directory.string() + "': " + error.message() +
+                             "; name a folder that can be written");
+}
+
+// After the last line: a list that is cut, or results that nobody could read, are no success.
+int printed() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return 0;
+  throw std::runtime_error("cannot write to standard output: the disk is full, or its reader has gone");
+}
+
 void write(const std::filesystem::path& directory, const std::vector<Measured>& all, Length length) {
   std::filesystem::create_directories(directory);
   const auto machine = describeMachine(length);
@@ -54,13 +74,14 @@ int run(const Options& options) {
     nlohmann::json list = nlohmann::json::array();
     for (const Benchmark& b : benchmarks()) list.push_back({{"name", b.name}, {"what", b.what}});
     std::printf("%s\n", list.dump().c_str());
-    return 0;
+    return printed();
   }
   if (options.list) {
     for (const Benchmark& b : benchmarks()) std::printf("%-12s %s\n", b.name.c_str(), b.what.c_str());
-    return 0;
+    return printed();
   }
   const std::vector<const Benchmark*> toRun = chosen(options.names);
+  if (!options.out.empty()) requireFolder(options.out);
   Run run;
   run.length = options.longest ? Length::longest : options.full ? Length::full : Length::windows;
   for (const std::string& line : describeMachine(run.length)) std::printf("%s\n", line.c_str());
@@ -84,7 +105,7 @@ int run(const Options& options) {
     // After each, so that an interrupted run leaves what it has.
     if (!options.out.empty()) write(options.out, all, run.length);
   }
-  return 0;
+  return printed();
 }
 
 void declare(CLI::App& app, Options& options) {
@@ -115,10 +136,13 @@ int main(int argc, char** argv) {
   Options options;
   declare(app, options);
   try {
-    app.parse(argc, argv);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& help) {
+      app.exit(help);
+      return printed();
+    }
     return run(options);
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "hapticd bench: %s; 'hapticd bench --help' lists the options\n", error.what());
     return 2;

@@ -16,6 +16,23 @@ status=0
 [ "$status" = 2 ]
 grep -q "there is no benchmark 'nosuchthing'" "$work/error"
 
+# A folder that cannot be written is refused before the measurement, not after it: a long one takes an hour.
+: > "$work/file"
+for folder in "$work/file" "$work/file/results"; do
+  status=0
+  "$hapticd" bench tick --out "$folder" >"$work/output" 2>"$work/error" || status=$?
+  [ "$status" = 1 ]
+  grep -q "^hapticd bench: cannot write to '$folder': Not a directory; name a folder" "$work/error"
+  [ ! -s "$work/output" ]
+done
+
+for what in --list "--list --json" --help; do
+  status=0
+  "$hapticd" bench $what >/dev/full 2>"$work/error" || status=$?  # unquoted: two options
+  [ "$status" = 1 ]
+  grep -q "^hapticd bench: cannot write to standard output" "$work/error"
+done
+
 ln "$hapticd" "$work/hapticd" 2>/dev/null || cp "$hapticd" "$work/hapticd"
 status=0
 "$work/hapticd" bench --list 2>"$work/error" || status=$?
