@@ -73,7 +73,7 @@ const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double 
   popThrough(hip, status);
   if (!wasFree && neighboursChangedByCommand(springBefore)) status |= kRenderGeometryJump;
   releaseWhenDeep(wasFree, status);
-  if (returnFromJump()) status |= kRenderGeometryJump;
+  if (returnFromJump(hip)) status |= kRenderGeometryJump;
   if (forceShading_) applyForceShading();
   unsigned touched = 0;
   for (int i = 0; i < contactSet_.count; ++i) {

@@ -192,7 +192,7 @@ class Proxy {
   Vec3 pressOf(const PlacedObject& object) const noexcept;
   void releaseByJump(const PlacedObject& object, std::uint32_t& status) noexcept;
   void takenByJump(const PlacedObject& object) noexcept;
-  bool returnFromJump() noexcept;
+  bool returnFromJump(const Vec3& hip) noexcept;
   static double missedMove(const PlacedObject& object) noexcept;
   void updateProxy(const Vec3& hip) noexcept;
   void updateWithoutFriction(const Vec3& hip, ActiveSet& active) noexcept;

@@ -478,22 +478,26 @@ void Proxy::takenByJump(const PlacedObject& object) noexcept {
 }
 
 // A closed surface that jumped has gone past the hand, and holds the proxy on its far side: the proxy returns
-// to where the jump found it. An open one may have risen over the hand, and keeps the proxy on the side where
-// it was. True when it returned.
-bool Proxy::returnFromJump() noexcept {
+// to where the jump found it, or, where the surface is there now, to the hand that has left the surface. An
+// open one may have risen over the hand, and keeps the proxy on the side where it was. True when it returned.
+bool Proxy::returnFromJump(const Vec3& hip) noexcept {
   if (!released_) jumper_ = -1;
   if (jumper_ < 0) return false;
   const int jumper = query_.addObject(jumper_);
   if (jumper < 0) return false;
   EnclosureBudget budget;
   if (!isClear(query_.object(jumper), now_.time, position_, 0, budget)) return false;
-  if (!isClear(query_.object(jumper), now_.time, beforeJump_, toolRadius_, budget)) return false;
-  for (int i = 0; i < query_.objectCount(); ++i) {
-    if (i != jumper &&
-        encloses(query_.object(i), query_.faces(), now_.time, beforeJump_, toolRadius_, budget))
-      return false;
-  }
-  position_ = reported_ = beforeJump_;
+  const auto isFree = [&](const Vec3& place) {
+    if (!isClear(query_.object(jumper), now_.time, place, toolRadius_, budget)) return false;
+    for (int i = 0; i < query_.objectCount(); ++i) {
+      if (i != jumper && encloses(query_.object(i), query_.faces(), now_.time, place, toolRadius_, budget))
+        return false;
+    }
+    return true;
+  };
+  const bool isFreeBefore = isFree(beforeJump_);
+  if (!isFreeBefore && !isFree(hip)) return false;
+  position_ = reported_ = isFreeBefore ? beforeJump_ : hip;
   beFree();
   return true;
 }

@@ -445,6 +445,44 @@ TEST(Jumps, view_that_jumps_over_a_free_hand_while_the_mesh_deforms) {
   }
 }
 
+// A box that goes away from a pressed hand and comes back around it is felt again once the hand has left it,
+// wherever it leaves, and so is what the hand meets then.
+TEST(Jumps, box_that_comes_back_around_the_hand_is_felt_once_the_hand_has_left) {
+  constexpr double kPress_m = 0.002;
+  for (const double radius_m : {0.0, 0.002}) {
+    for (const double way_mm : {100.0, -100.0, 1e4}) {
+      for (const Vec3& outside :
+           {Vec3(0.001, 0.015, 0.002), Vec3(0.055, -0.02, 0.002), Vec3(0.001, -0.05, 0.002)}) {
+        Loop loop({.toolRadius_m = radius_m});
+        loop.add(0, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40)));
+        loop.add(1, boxTriples(Vec3(-20, 25, -20), Vec3(20, 60, 20)));
+        const Vec3 above(0.001, 0.010, 0.002);
+        const Vec3 pressed(0.001, radius_m - kPress_m, 0.002);
+        const Vec3 pressedFromBelow(0.001, 0.025 - radius_m + kPress_m, 0.002);
+        loop.rest(above, toNanos(0.3));
+        loop.to(pressed);
+        ASSERT_NEAR(loop.out.force_N.y(), kStiffness_N_per_m * kPress_m, 1e-3);
+        loop.place(0, {0, way_mm, 0});
+        loop.rest(pressed, toNanos(0.2));
+        loop.place(0, Vec3::Zero());
+        loop.rest(pressed, toNanos(0.2));
+        loop.to(outside);
+        loop.rest(outside, toNanos(0.1));
+        EXPECT_EQ(loop.out.force_N.norm(), 0) << way_mm << " to " << outside.transpose();
+        EXPECT_EQ(loop.out.status, 0U) << way_mm << " to " << outside.transpose();
+        EXPECT_LT((loop.out.proxy_m - outside).norm(), 1e-6) << way_mm << " to " << outside.transpose();
+        for (const Vec3& corner : {Vec3(0.06, outside.y(), 0.002), Vec3(0.06, 0.01, 0.002), above})
+          loop.to(corner);
+        loop.to(pressedFromBelow);
+        EXPECT_NEAR(loop.out.force_N.y(), -kStiffness_N_per_m * kPress_m, 1e-3) << way_mm;
+        loop.to(above);
+        loop.to(pressed);
+        EXPECT_NEAR(loop.out.force_N.y(), kStiffness_N_per_m * kPress_m, 1e-3) << way_mm;
+      }
+    }
+  }
+}
+
 // What jumps past a hand leaves it to what else it touches. Boxes of all sizes and heights above a floor,
 // with one pose and with streams at 60 Hz.
 TEST(Jumps, box_that_goes_past_the_hand_leaves_it_to_the_floor) {
