@@ -164,12 +164,25 @@ void ObjectTable::checkMeshes(Nanos now, NoticeBoard& board, std::vector<Notice>
 }
 
 // Null where it stays, or moves without a sweep.
-std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, Nanos now) {
+std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, const Call& call) {
+  // A place beside the hand, seen from there, is known to 0.1 um.
+  constexpr double kFarthest_m = 1e9;
+  const Nanos now = call.now;
   Affine T_world_object = frameOf(object) * Eigen::UniformScaling<double>(object.worldUnits());
   T_world_object = T_world_object * object.T_object_mesh;
   const Affine& present = object.motion.destination();
   const bool first = object.motion.jumps() == 0;
-  if (!isInvertible(T_world_object)) return {};  // a chain of parents out of range: stay
+  if (!isInvertible(T_world_object)) {
+    call.warn("place", "out of range through its parents or the origin of the scene; it stays where it was",
+              " of object ", object.id);
+    return {};
+  }
+  if (const double distance_m = T_world_object.translation().norm() / worldUnitsPerMetre_;
+      distance_m > kFarthest_m) {
+    T_world_object.translation() *= kFarthest_m / distance_m;
+    call.warn("place", "too far away; brought nearer, to a million kilometres", " of object ", object.id,
+              ", ", distance_m, " m");
+  }
   if (!first && T_world_object.matrix() == present.matrix()) return {};
   const bool sameHand = T_world_object.linear().determinant() * present.linear().determinant() > 0;
   object.stateChanged = true;
@@ -190,7 +203,7 @@ std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, Nanos now) 
 
 // Objects that a client moves together, by one map of the world, arrive together and stay together on the
 // way: no gap opens between the parts of what turns.
-void ObjectTable::updateMotions(Nanos now) {
+void ObjectTable::updateMotions(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   constexpr double kTogether_m = 0.5e-6;
   // Of those of one batch, so that thousands that move by themselves take no longer.
   const std::size_t mostLeaders =
@@ -201,7 +214,7 @@ void ObjectTable::updateMotions(Nanos now) {
     Object* object = find(id);
     if (object == nullptr || !std::exchange(object->moved, false)) continue;
     unsettle(now);
-    std::optional<Move> move = moveOf(*object, now);
+    std::optional<Move> move = moveOf(*object, Call{object->meshSetBy, now, false, board, out});
     if (!move) continue;
     move->leader = moves.size();
     const auto asOne = [&](std::size_t k) {
@@ -278,7 +291,7 @@ bool ObjectTable::publish(Nanos now, double worldUnitsPerMetre, double freeLoad_
 
 bool ObjectTable::updatePublished(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   spreadMoves();
-  updateMotions(now);
+  updateMotions(now, board, out);
   bool changed = false;
   bool loadsChanged = false;
   for (const std::int32_t id : changed_) {

@@ -181,8 +181,8 @@ class ObjectTable {
     Nanos travel = 0;
     std::size_t leader = 0;  // number of the move that it follows, or its own
   };
-  std::optional<Move> moveOf(Object& object, Nanos now);
-  void updateMotions(Nanos now);
+  std::optional<Move> moveOf(Object& object, const Call& call);
+  void updateMotions(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   void unsettle(Nanos now);
   void spreadFreeLoad(double load_Ns_per_m);
   void updateHeaviest();

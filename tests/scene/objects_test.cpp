@@ -98,6 +98,37 @@ TEST_F(Objects, ChildrenFollowTheirParentsInTheirOwnUnits) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Objects, AreNotFartherThanAMillionKilometres) {
+  makeTouchable(0);
+  say(SetTransform{0, columns(at(3e20, 0, -4e20))});
+  publish();
+  EXPECT_TRUE(placed(0).isApprox(Vec3(0.6e12, 0, -0.8e12)));
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("place of object 0, 5e+17 m: too far away"));
+  say(SetTransform{0, columns(at(0, 0.99e12, 0))});
+  publish();
+  EXPECT_TRUE(placed(0).isApprox(Vec3(0, 0.99e12, 0)));
+  EXPECT_TRUE(notices_.empty());
+}
+
+TEST_F(Objects, StayWhereNoPlaceIsKnownThroughTheirParents) {
+  makeTouchable(2);
+  say(AddObject{1, -1});
+  say(MoveToParent{2, 1});
+  say(SetTransform{2, columns(at(1, 2, 3))});
+  publish();
+  const Affine large(Eigen::UniformScaling<double>(1e20));
+  say(SetTransform{1, columns(large)});
+  say(SetTransform{2, columns(at(1, 2, 3) * large)});
+  publish();
+  EXPECT_TRUE(placed(2).isApprox(Vec3(1, 2, 3)));
+  EXPECT_THAT(onlyNotice(Severity::warning),
+              HasSubstr("place of object 2: out of range through its parents"));
+  say(SetTransform{1, columns(at(0, 0, 0))});
+  say(SetTransform{2, columns(at(1, 2, 4))});
+  publish();
+  EXPECT_TRUE(placed(2).isApprox(Vec3(1, 2, 4)));
+}
+
 TEST_F(Objects, RemovingAnObjectRemovesWhatHangsBelowIt) {
   say(AddObject{1, -1});
   say(AddObject{2, 1});

@@ -483,6 +483,34 @@ TEST(Jumps, box_that_comes_back_around_the_hand_is_felt_once_the_hand_has_left) 
   }
 }
 
+// A client hides an object by sending it very far, and brings it back. 1e16 mm away the spacing of the
+// numbers is 2 mm: no place beside the hand was known from there.
+TEST(Jumps, box_that_was_sent_very_far_is_felt_again) {
+  const Vec3 above(0.001, 0.06, 0.002);
+  const Vec3 pressed(0.001, -0.002, 0.002);
+  for (const double way_mm : {1e9, -1e12, 1e13, -1e16, 1e17, 1e20, -1e29}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const bool withHandInside : {false, true}) {
+        Loop loop;
+        loop.add(0, boxTriples(Vec3(-40, -30, -40), Vec3(40, 0, 40)));
+        loop.rest(above, toNanos(0.3));
+        loop.to(pressed);
+        loop.place(0, way_mm * Vec3::Unit(axis));
+        loop.rest(pressed, toNanos(0.2));
+        EXPECT_EQ(loop.out.force_N.norm(), 0) << way_mm << " along " << axis;
+        if (!withHandInside) loop.to(above);
+        loop.place(0, Vec3::Zero());
+        loop.rest(withHandInside ? pressed : above, toNanos(0.2));
+        loop.to(above);
+        loop.rest(above, toNanos(0.2));
+        loop.to(pressed);
+        EXPECT_NEAR(loop.out.force_N.y(), kStiffness_N_per_m * 0.002, 1e-3)
+            << way_mm << " along " << axis << ", " << withHandInside;
+      }
+    }
+  }
+}
+
 // What jumps past a hand leaves it to what else it touches. Boxes of all sizes and heights above a floor,
 // with one pose and with streams at 60 Hz.
 TEST(Jumps, box_that_goes_past_the_hand_leaves_it_to_the_floor) {
