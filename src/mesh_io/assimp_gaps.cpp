@@ -76,22 +76,11 @@ std::string readNext(Assimp::IOStream& file, std::size_t most) {
   return text;
 }
 
-}  // namespace
-
 // Assimp takes whole numbers for the bits of floats where an extension says that they are none.
-void refuseUnknownMeshes(Assimp::IOStream& file, const std::string& format) {
-  constexpr std::size_t kGlbHeader = 20;
-  std::size_t size = file.FileSize();
-  if (format == "glb") {
-    const std::string header = readNext(file, kGlbHeader);
-    size = 0;
-    for (std::size_t i = 16; i > 12 && header.size() == kGlbHeader; --i)
-      size = size << 8U | static_cast<unsigned char>(header[i - 1]);
-  }
-  const std::string json = readNext(file, size);
+void refuseUnknownMeshes(std::string_view json) {
   const std::size_t list = json.find("\"extensionsRequired\"");
-  if (list == std::string::npos) return;
-  std::string_view names = std::string_view(json).substr(list);
+  if (list == std::string_view::npos) return;
+  std::string_view names = json.substr(list);
   names = names.substr(0, names.find(']'));
   names.remove_prefix(std::min(names.size(), names.find('[')));
   for (std::size_t open = names.find('"'); open != std::string_view::npos; open = names.find('"')) {
@@ -102,6 +91,26 @@ void refuseUnknownMeshes(Assimp::IOStream& file, const std::string& format) {
       throw std::runtime_error("it requires the extension " + std::string(name) +
                                ", which is not supported: save it without");
   }
+}
+
+bool isUtf16(std::string_view head) {
+  if (head.size() < 4) return false;
+  return (head.starts_with("\xFE\xFF") && head[2] == '\0') ||
+         (head.starts_with("\xFF\xFE") && head[3] == '\0');
+}
+
+}  // namespace
+
+void refuseWhatAssimpMisreads(Assimp::IOStream& file, const std::string& format) {
+  constexpr std::size_t kGlbHeader = 20;
+  const std::string head = readNext(file, kGlbHeader);
+  if (isUtf16(head)) throw std::runtime_error("it is a text in UTF-16: save it in UTF-8");
+  if (format == "gltf") refuseUnknownMeshes(head + readNext(file, file.FileSize()));
+  if (format != "glb" || head.size() < kGlbHeader) return;
+  if (head.starts_with("glTF\1")) throw std::runtime_error("it is glTF 1: save it as glTF 2");
+  std::size_t size = 0;
+  for (std::size_t i = 16; i > 12; --i) size = size << 8U | static_cast<unsigned char>(head[i - 1]);
+  refuseUnknownMeshes(readNext(file, size));
 }
 
 // A text is never taken for a binary STL: its characters would be a number of triangles that needs gigabytes.

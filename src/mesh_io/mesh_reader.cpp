@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <array>
+#include <assimp/DefaultLogger.hpp>
 #include <assimp/Importer.hpp>
+#include <assimp/LogStream.hpp>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -27,6 +29,7 @@ using geometry::TriangleMesh;
 
 constexpr std::array<std::string_view, 5> kFormats = {"obj", "stl", "ply", "gltf", "glb"};
 constexpr int kDeepestNode = 500;
+constexpr const char* kNoSuchCorner = "a triangle has a corner that does not exist";
 
 std::string formatOf(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
@@ -103,6 +106,32 @@ class PlyImporter final : public Assimp::BaseImporter {
   }
 };
 
+// Assimp leaves out triangles of a glTF whose corners do not exist, and tells only its log.
+class DroppedFaces {
+ public:
+  DroppedFaces() {
+    Assimp::DefaultLogger::create("", Assimp::Logger::NORMAL, 0);
+    Assimp::DefaultLogger::get()->attachStream(new Warnings(any_), Assimp::Logger::Warn);
+  }
+  ~DroppedFaces() { Assimp::DefaultLogger::kill(); }
+  DroppedFaces(const DroppedFaces&) = delete;
+  DroppedFaces& operator=(const DroppedFaces&) = delete;
+  bool any() const noexcept { return any_; }
+
+ private:
+  class Warnings final : public Assimp::LogStream {
+   public:
+    explicit Warnings(bool& any) : any_(any) {}
+    void write(const char* message) override {
+      if (std::string_view(message).find("faces were dropped") != std::string_view::npos) any_ = true;
+    }
+
+   private:
+    bool& any_;
+  };
+  bool any_ = false;
+};
+
 // Assimp tries readers by content, too; those of other formats are removed.
 void keepOnly(Assimp::Importer& importer, const std::string& format) {
   for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
@@ -130,10 +159,10 @@ void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_nod
   const bool mirrored = T_file_node.Determinant() < 0;
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     const aiFace& face = part.mFaces[i];
-    if (face.mNumIndices != 3) continue;
+    if (face.mNumIndices != 3) continue;  // a point or a line
     // A corner that this part does not have would be a vertex of the next part.
     if (std::any_of(face.mIndices, face.mIndices + 3, [&](unsigned c) { return c >= part.mNumVertices; }))
-      throw std::runtime_error("a triangle has a corner that does not exist");
+      throw std::runtime_error(kNoSuchCorner);
     Triangle t{first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]};
     if (mirrored) std::swap(t[1], t[2]);
     all.triangles.push_back(t);
@@ -157,9 +186,7 @@ void appendNode(TriangleMesh& all, const aiScene& scene, const aiNode& node, con
 // Assimp names its own parts where a file has no triangles, or another format.
 std::string explained(const std::string& reason, const std::string& format) {
   const auto names = [&](std::string_view text) { return reason.find(text) != std::string::npos; };
-  if (names("No meshes remaining") || names("OBJ-file is too small") || names("File is empty") ||
-      names("Mesh with invalid primitive type"))
-    return "it holds no triangles";
+  if (names("OBJ-file is too small") || names("File is empty")) return "it holds no triangles";
   if (names("No suitable reader") || names("Failed to determine STL"))
     return "it is not a ." + format + " file";
   return reason.empty() ? "it cannot be read" : reason;
@@ -176,24 +203,23 @@ TriangleMesh readMesh(const std::filesystem::path& file) {
   Assimp::Importer importer;
   keepOnly(importer, format);
   importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
-  if (format == "gltf" || format == "glb") {
-    const std::unique_ptr<Assimp::IOStream> content(importer.GetIOHandler()->Open(file.c_str(), "rb"));
-    if (content) refuseUnknownMeshes(*content, format);
-  }
-  // Only positions matter; points and lines go.
+  if (const std::unique_ptr<Assimp::IOStream> content(importer.GetIOHandler()->Open(file.c_str(), "rb"));
+      content)
+    refuseWhatAssimpMisreads(*content, format);
+  const DroppedFaces dropped;
+  // Only positions matter.
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
                               aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
                                   aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
                                   aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS |
                                   aiComponent_MATERIALS);
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const aiScene* scene = importer.ReadFile(
-      file.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent);
+  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_RemoveComponent);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string reason = importer.GetErrorString();
     if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
     throw std::runtime_error(explained(reason, format));
   }
+  if (dropped.any()) throw std::runtime_error(kNoSuchCorner);
 
   TriangleMesh mesh;
   appendNode(mesh, *scene, *scene->mRootNode, aiMatrix4x4(), 0);

@@ -256,6 +256,16 @@ TEST_F(MeshFiles, StlInUpperCase) {
             1U);
 }
 
+// As CAD programs write them for parts that are hidden.
+TEST_F(MeshFiles, StlWithEmptySolids) {
+  EXPECT_EQ(
+      loadMesh(write("parts.stl",
+                     "solid a\nendsolid a\nsolid b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"
+                     "vertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid b\nsolid c\nendsolid c\n"))
+          .triangles.size(),
+      1U);
+}
+
 TEST_F(MeshFiles, AGltfThatRequiresUnknownMeshesIsRefused) {
   const auto requiring = [](std::string json, const std::string& names) {
     return json.insert(json.find('{') + 1, R"("extensionsRequired" : [ )" + names + " ],");
@@ -296,6 +306,14 @@ TEST_F(MeshFiles, ErrorsNameTheFileAndTheReason) {
                 HasSubstr("text." + format + "': it is not a ." + format + " file"));
   EXPECT_THAT(errorOf(write("cut.glb", glb(gltfJson("", R"([{"mesh":0}])")).substr(0, 300))),
               HasSubstr("cut.glb"));
+  std::string first = glb(gltfJson("", R"([{"mesh":0}])"));
+  first[4] = 1;
+  EXPECT_THAT(errorOf(write("first.glb", first)), HasSubstr("it is glTF 1: save it as glTF 2"));
+  for (const std::string mark : {"\xFE\xFF", "\xFF\xFE"}) {
+    std::string wide = mark;
+    for (const char c : cubeObj()) wide += mark[0] == '\xFE' ? std::string{'\0', c} : std::string{c, '\0'};
+    EXPECT_THAT(errorOf(write("wide.obj", wide)), HasSubstr("it is a text in UTF-16: save it in UTF-8"));
+  }
   std::string far(80, ' ');
   far += bytes<std::uint32_t>({1'000'000});
   EXPECT_THAT(errorOf(write("short.stl", far)), HasSubstr("short.stl"));
@@ -363,6 +381,11 @@ TEST_F(MeshFiles, CornersThatDoNotExistAreNoMemoryErrors) {
       "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
   EXPECT_THAT(errorOf(write("far.ply", header + "3 0 1 900000000\n")), HasSubstr("far.ply"));
   EXPECT_THAT(errorOf(write("negative.ply", header + "3 0 1 -2\n")), HasSubstr("negative.ply"));
+  std::string data = gltfData();
+  data.replace(data.rfind('\x07'), 1, "\x08");  // the last corner of the last triangle
+  write("cube.bin", data);
+  EXPECT_THAT(errorOf(write("far.gltf", gltfJson(R"("uri":"cube.bin",)", R"([{"mesh":0}])"))),
+              HasSubstr("far.gltf': a triangle has a corner that does not exist"));
 }
 
 // Loads in a child with small limits.
