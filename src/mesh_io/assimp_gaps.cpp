@@ -10,31 +10,25 @@
 namespace hapticd::mesh_io {
 namespace {
 
-// What is changed in the bytes of a file; no change moves them.
-enum class Edit { none, lowerCase, objLines };
-
 // A part of another stream, which it owns.
 class StreamPart final : public Assimp::IOStream {
  public:
-  StreamPart(std::unique_ptr<Assimp::IOStream> whole, std::size_t begin, std::size_t size, Edit edit)
-      : whole_(std::move(whole)), begin_(begin), size_(size), edit_(edit) {
+  StreamPart(std::unique_ptr<Assimp::IOStream> whole, std::size_t begin, std::size_t size, bool lowerCase)
+      : whole_(std::move(whole)), begin_(begin), size_(size), lowerCase_(lowerCase) {
     whole_->Seek(begin, aiOrigin_SET);
   }
 
   std::size_t Read(void* out, std::size_t size, std::size_t count) override {
     if (size == 0) return 0;
     const std::size_t read = whole_->Read(out, size, std::min(count, (size_ - Tell()) / size));
-    for (char& c : std::span(static_cast<char*>(out), read * size)) c = edited(c);
+    for (char& c : std::span(static_cast<char*>(out), lowerCase_ ? read * size : 0))
+      c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     return read;
   }
   std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     const std::size_t from = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? Tell() : size_;
     const std::size_t to = from + offset;  // an offset back wraps around
-    if (to != Tell()) {                    // before each block of a text Assimp seeks to where it is
-      first_ = last_ = '\n';
-      comment_ = false;
-    }
     return to > size_ ? aiReturn_FAILURE : whole_->Seek(begin_ + to, aiOrigin_SET);
   }
   std::size_t Tell() const override { return whole_->Tell() - begin_; }
@@ -42,31 +36,10 @@ class StreamPart final : public Assimp::IOStream {
   void Flush() override {}
 
  private:
-  char edited(char c) {
-    if (edit_ == Edit::lowerCase) return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    if (edit_ == Edit::none || c == '\r') return c;
-    // An indented line begins anew, a comment behind numbers is blank, and no comment goes on in the next
-    // line.
-    if (c == '\n') {
-      if (last_ != '\\') first_ = '\n';
-      comment_ = false;
-    } else if (first_ == '\n') {
-      if (c == ' ' || c == '\t') return '\n';
-      first_ = c;
-    } else if (c == '#' && (first_ == 'v' || first_ == 'f')) {
-      comment_ = true;
-    }
-    if (comment_ || (c == '\\' && first_ == '#')) c = ' ';
-    return last_ = c;
-  }
-
   const std::unique_ptr<Assimp::IOStream> whole_;
   const std::size_t begin_;
   const std::size_t size_;
-  const Edit edit_;
-  char first_ = '\n';  // of the line; a line that goes on after a backslash is one
-  char last_ = '\n';
-  bool comment_ = false;
+  const bool lowerCase_;
 };
 
 // At most so many of the next bytes.
@@ -124,7 +97,7 @@ std::unique_ptr<Assimp::IOStream> asAssimpReadsIt(std::unique_ptr<Assimp::IOStre
   file->Seek(0, aiOrigin_SET);
   const std::size_t begin = head.starts_with(kMark) ? kMark.size() : 0;
   std::size_t end = file->FileSize();
-  Edit edit = format == "obj" ? Edit::objLines : Edit::none;
+  bool lowerCase = false;
   if (format == "stl" && head.size() == kStlHeader) {
     std::size_t triangles = 0;
     for (std::size_t i = kStlHeader; i > kStlHeader - 4; --i)
@@ -132,10 +105,10 @@ std::unique_ptr<Assimp::IOStream> asAssimpReadsIt(std::unique_ptr<Assimp::IOStre
     if (triangles > 0 && kStlHeader + kStlTriangle * triangles <= end) {
       end = kStlHeader + kStlTriangle * triangles;
     } else if (head.find("SOLID") == begin) {
-      edit = Edit::lowerCase;
+      lowerCase = true;
     }
   }
-  return std::make_unique<StreamPart>(std::move(file), begin, end - begin, edit);
+  return std::make_unique<StreamPart>(std::move(file), begin, end - begin, lowerCase);
 }
 
 std::string decodedUri(std::string_view uri) {

@@ -13,7 +13,7 @@ namespace hapticd::mesh_io {
 void refuseWhatAssimpMisreads(Assimp::IOStream& file, const std::string& format);
 
 /// The file without a byte order mark before its text, without bytes after the last triangle of a binary STL,
-/// without indentation and comments behind numbers in OBJ, and in lower case where an STL is in upper case.
+/// and in lower case where an STL is in upper case.
 std::unique_ptr<Assimp::IOStream> asAssimpReadsIt(std::unique_ptr<Assimp::IOStream> file,
                                                   const std::string& format);
 

@@ -19,6 +19,7 @@
 
 #include "geometry/weld.h"
 #include "mesh_io/assimp_gaps.h"
+#include "mesh_io/obj_file.h"
 #include "mesh_io/ply_file.h"
 
 namespace hapticd::mesh_io {
@@ -64,14 +65,17 @@ class OnlyGeometry final : public Assimp::DefaultIOSystem {
   const std::string format_;
 };
 
-// Assimp's own reader of PLY crashes, and loses or invents triangles. Polygons are for Assimp to divide.
-class PlyImporter final : public Assimp::BaseImporter {
+// Assimp's own readers of PLY and OBJ lose or invent triangles, and that of PLY crashes. Polygons are for
+// Assimp to divide.
+class PolygonImporter final : public Assimp::BaseImporter {
  public:
+  using Parse = PolygonMesh(std::string_view bytes);
+  explicit PolygonImporter(Parse* parse) : parse_(parse) {}
   bool CanRead(const std::string&, Assimp::IOSystem*, bool) const override { return true; }
 
  protected:
   const aiImporterDesc* GetInfo() const override {
-    static const aiImporterDesc info{"PLY", "", "", "", 0, 0, 0, 0, 0, "ply"};
+    static const aiImporterDesc info{"polygons", "", "", "", 0, 0, 0, 0, 0, "obj ply"};
     return &info;
   }
   void InternReadFile(const std::string& name, aiScene* scene, Assimp::IOSystem* files) override {
@@ -79,23 +83,23 @@ class PlyImporter final : public Assimp::BaseImporter {
     if (!file) throw std::runtime_error("it cannot be read");
     std::string bytes(file->FileSize(), '\0');
     bytes.resize(file->Read(bytes.data(), 1, bytes.size()));
-    const PlyMesh ply = parsePly(bytes);
+    const PolygonMesh polygons = parse_(bytes);
     auto mesh = std::make_unique<aiMesh>();
-    mesh->mNumVertices = static_cast<unsigned>(ply.vertices.size());
-    mesh->mVertices = new aiVector3D[ply.vertices.size()];
-    for (std::size_t i = 0; i < ply.vertices.size(); ++i)
-      mesh->mVertices[i] = {ply.vertices[i].x(), ply.vertices[i].y(), ply.vertices[i].z()};
-    mesh->mFaces = new aiFace[ply.sizes.size()];
-    mesh->mNumFaces = static_cast<unsigned>(ply.sizes.size());
-    const std::uint32_t* corner = ply.corners.data();
-    for (std::size_t i = 0; i < ply.sizes.size(); ++i) {
+    mesh->mNumVertices = static_cast<unsigned>(polygons.vertices.size());
+    mesh->mVertices = new aiVector3D[polygons.vertices.size()];
+    for (std::size_t i = 0; i < polygons.vertices.size(); ++i)
+      mesh->mVertices[i] = {polygons.vertices[i].x(), polygons.vertices[i].y(), polygons.vertices[i].z()};
+    mesh->mFaces = new aiFace[polygons.sizes.size()];
+    mesh->mNumFaces = static_cast<unsigned>(polygons.sizes.size());
+    const std::uint32_t* corner = polygons.corners.data();
+    for (std::size_t i = 0; i < polygons.sizes.size(); ++i) {
       aiFace& face = mesh->mFaces[i];
-      face.mIndices = new unsigned[ply.sizes[i]];
-      face.mNumIndices = ply.sizes[i];
-      std::copy_n(corner, ply.sizes[i], face.mIndices);
-      corner += ply.sizes[i];
+      face.mIndices = new unsigned[polygons.sizes[i]];
+      face.mNumIndices = polygons.sizes[i];
+      std::copy_n(corner, polygons.sizes[i], face.mIndices);
+      corner += polygons.sizes[i];
     }
-    if (ply.sizes.empty()) throw std::runtime_error("it holds no triangles");
+    if (polygons.sizes.empty()) throw std::runtime_error("it holds no triangles");
     scene->mRootNode = new aiNode;
     scene->mRootNode->mMeshes = new unsigned[1]{0};
     scene->mRootNode->mNumMeshes = 1;
@@ -104,6 +108,9 @@ class PlyImporter final : public Assimp::BaseImporter {
     scene->mMaterials = new aiMaterial* [1] { new aiMaterial };
     scene->mNumMaterials = 1;
   }
+
+ private:
+  Parse* const parse_;
 };
 
 // Assimp leaves out triangles of a glTF whose corners do not exist, and tells only its log.
@@ -134,14 +141,15 @@ class DroppedFaces {
 
 // Assimp tries readers by content, too; those of other formats are removed.
 void keepOnly(Assimp::Importer& importer, const std::string& format) {
+  PolygonImporter::Parse* const parse = format == "ply" ? parsePly : format == "obj" ? parseObj : nullptr;
   for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
     Assimp::BaseImporter* reader = importer.GetImporter(i);
     const std::string extensions = ' ' + std::string(importer.GetImporterInfo(i)->mFileExtensions) + ' ';
-    if (format != "ply" && extensions.find(' ' + format + ' ') != std::string::npos) continue;
+    if (parse == nullptr && extensions.find(' ' + format + ' ') != std::string::npos) continue;
     importer.UnregisterLoader(reader);
     delete reader;
   }
-  if (format == "ply") importer.RegisterLoader(new PlyImporter);
+  if (parse != nullptr) importer.RegisterLoader(new PolygonImporter(parse));
 }
 
 void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_node) {

@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <iomanip>
 #include <optional>
 #include <sstream>
-#include <stdexcept>
 #include <string>
-
-#include "mesh_io/mesh_reader.h"
 
 namespace hapticd::mesh_io {
 namespace {
@@ -37,23 +32,6 @@ struct Element {
   std::vector<Property> properties;
 };
 
-[[noreturn]] void fail(const std::string& what) {
-  throw std::runtime_error(what);
-}
-
-std::string quoted(std::string_view text) {
-  return '\'' + std::string(text.substr(0, 64)) + '\'';
-}
-
-// The next word of a line, and an empty one at its end.
-std::string_view word(std::string_view& line) {
-  constexpr std::string_view kBlank = " \t\r";
-  line.remove_prefix(std::min(line.size(), line.find_first_not_of(kBlank)));
-  const std::string_view found = line.substr(0, line.find_first_of(kBlank));
-  line.remove_prefix(found.size());
-  return found;
-}
-
 Type typeOf(std::string_view name) {
   constexpr std::array<std::array<std::string_view, 2>, 8> kNames = {{{"char", "int8"},
                                                                       {"uchar", "uint8"},
@@ -65,7 +43,7 @@ Type typeOf(std::string_view name) {
                                                                       {"double", "float64"}}};
   for (std::size_t i = 0; i < kNames.size(); ++i)
     if (name == kNames[i][0] || name == kNames[i][1]) return static_cast<Type>(i);
-  fail("a property has the unknown type " + quoted(name));
+  refuse("a property has the unknown type " + inQuotes(name));
 }
 
 // The rest of the file from some place on.
@@ -82,7 +60,7 @@ class Content {
     return found;
   }
   std::string_view bytes(std::size_t count) {
-    if (count > rest_.size()) fail("it ends early, within the data");
+    if (count > rest_.size()) refuse("it ends early, within the data");
     const std::string_view found = rest_.substr(0, count);
     rest_.remove_prefix(count);
     return found;
@@ -116,11 +94,11 @@ Property propertyFrom(std::string_view line) {
 }
 
 Header readHeader(Content& content) {
-  if (content.line() != "ply") fail("it does not begin with 'ply'");
+  if (content.line() != "ply") refuse("it does not begin with 'ply'");
   Header header;
   bool formatted = false;
   for (;;) {
-    if (content.empty()) fail("its header has no end");
+    if (content.empty()) refuse("its header has no end");
     std::string_view line = content.line();
     const std::string_view keyword = word(line);
     if (keyword == "end_header") break;
@@ -132,24 +110,25 @@ Header readHeader(Content& content) {
       } else if (name == "binary_big_endian") {
         header.encoding = Encoding::bigEndian;
       } else if (name != "ascii") {
-        fail("its format " + quoted(name) + " is unknown");
+        refuse("its format " + inQuotes(name) + " is unknown");
       }
     } else if (keyword == "element") {
       Element element{.name = word(line), .count = 0, .properties = {}};
       const std::string_view count = word(line);
       const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), element.count);
       if (error != std::errc{} || end != count.data() + count.size())
-        fail("the number of elements " + quoted(count) + " in line " + std::to_string(content.lineNumber()) +
-             " is none");
+        refuse("the number of elements " + inQuotes(count) + " in line " +
+               std::to_string(content.lineNumber()) + " is none");
       header.elements.push_back(std::move(element));
     } else if (keyword == "property") {
-      if (header.elements.empty()) fail("a property precedes all elements");
+      if (header.elements.empty()) refuse("a property precedes all elements");
       header.elements.back().properties.push_back(propertyFrom(line));
     } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
-      fail("line " + std::to_string(content.lineNumber()) + " of its header begins with " + quoted(keyword));
+      refuse("line " + std::to_string(content.lineNumber()) + " of its header begins with " +
+             inQuotes(keyword));
     }
   }
-  if (!formatted) fail("its header names no format");
+  if (!formatted) refuse("its header names no format");
   return header;
 }
 
@@ -162,7 +141,7 @@ class Rows {
   void begin() {
     if (encoding_ != Encoding::text) return;
     for (row_ = {}; row_.find_first_not_of(" \t\r") == std::string_view::npos; row_ = content_.line())
-      if (content_.empty()) fail("it ends early, within the data");
+      if (content_.empty()) refuse("it ends early, within the data");
   }
 
   double number(Type type) {
@@ -200,8 +179,8 @@ class Rows {
     const std::size_t least = encoding_ == Encoding::text ? 1 : sizeOf(list.type);
     const std::size_t left = encoding_ == Encoding::text ? row_.size() : content_.left();
     if (!(value >= 0 && value == std::floor(value)))
-      fail(where() + "a list has a length of " + std::to_string(value));
-    if (value > static_cast<double>(left / least)) fail(where() + "a list is longer than the data");
+      refuse(where() + "a list has a length of " + std::to_string(value));
+    if (value > static_cast<double>(left / least)) refuse(where() + "a list is longer than the data");
     return static_cast<std::size_t>(value);
   }
 
@@ -224,15 +203,11 @@ class Rows {
   }
 
   double numberOfText() {
-    std::string_view text = word(row_);
-    if (text.empty()) fail(where() + "values are missing");
-    if (text.starts_with('+')) text.remove_prefix(1);
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error == std::errc::invalid_argument || end != text.data() + text.size())
-      fail(where() + quoted(text) + " is no number");
-    if (error == std::errc::result_out_of_range) return std::strtod(std::string(text).c_str(), nullptr);
-    return value;
+    const std::string_view text = word(row_);
+    if (text.empty()) refuse(where() + "values are missing");
+    const std::optional<double> value = numberFrom(text);
+    if (!value) refuse(where() + inQuotes(text) + " is no number");
+    return *value;
   }
 
   Content content_;
@@ -240,19 +215,14 @@ class Rows {
   std::string_view row_;
 };
 
-void requireRoom(std::size_t count) {
-  if (count > kLargestMesh)
-    fail("it has more than " + std::to_string(kLargestMesh) + " triangles or vertices: reduce it");
-}
-
-void readVertices(const Element& element, Rows& rows, PlyMesh& mesh) {
+void readVertices(const Element& element, Rows& rows, PolygonMesh& mesh) {
   std::array<std::size_t, 3> at{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     constexpr std::array<std::string_view, 3> kNames = {"x", "y", "z"};
     const auto found =
         std::find_if(element.properties.begin(), element.properties.end(),
                      [&](const Property& p) { return p.name == kNames[axis] && !p.count.has_value(); });
-    if (found == element.properties.end()) fail("its vertices have no " + std::string(kNames[axis]));
+    if (found == element.properties.end()) refuse("its vertices have no " + std::string(kNames[axis]));
     at[axis] = static_cast<std::size_t>(found - element.properties.begin());
   }
   requireRoom(element.count);
@@ -278,13 +248,13 @@ std::uint32_t cornerOf(double value, std::size_t vertices, const Rows& rows) {
     std::ostringstream text;
     text << rows.where() << "a face has the corner " << std::setprecision(15) << value << ", but there are "
          << vertices << " vertices";
-    fail(text.str());
+    refuse(text.str());
   }
   return static_cast<std::uint32_t>(value);
 }
 
 // Each corner makes a triangle with the two before it, of alternating order; -1 begins anew.
-void addStrip(const std::vector<double>& strip, std::size_t vertices, const Rows& rows, PlyMesh& mesh) {
+void addStrip(const std::vector<double>& strip, std::size_t vertices, const Rows& rows, PolygonMesh& mesh) {
   std::size_t begin = 0;
   std::array<std::uint32_t, 3> last{};
   for (std::size_t i = 0; i < strip.size(); ++i) {
@@ -301,12 +271,12 @@ void addStrip(const std::vector<double>& strip, std::size_t vertices, const Rows
 }
 
 // `strips`: of triangles, instead of the corners of one face each.
-void readFaces(const Element& element, bool strips, std::size_t vertices, Rows& rows, PlyMesh& mesh) {
+void readFaces(const Element& element, bool strips, std::size_t vertices, Rows& rows, PolygonMesh& mesh) {
   const auto list = std::find_if(element.properties.begin(), element.properties.end(), [](const Property& p) {
     return p.count.has_value() && (p.name == "vertex_indices" || p.name == "vertex_index");
   });
   if (list == element.properties.end() && element.count > 0)
-    fail("its element " + quoted(element.name) + " has no list vertex_indices");
+    refuse("its element " + inQuotes(element.name) + " has no list vertex_indices");
   std::vector<double> corners;
   for (std::size_t i = 0; i < element.count; ++i) {
     rows.begin();
@@ -330,13 +300,13 @@ void readFaces(const Element& element, bool strips, std::size_t vertices, Rows& 
 
 }  // namespace
 
-PlyMesh parsePly(std::string_view bytes) {
+PolygonMesh parsePly(std::string_view bytes) {
   Content content(bytes);
   const Header header = readHeader(content);
   const auto vertices = std::find_if(header.elements.begin(), header.elements.end(),
                                      [](const Element& element) { return element.name == "vertex"; });
-  if (vertices == header.elements.end()) fail("it has no vertices");
-  PlyMesh mesh;
+  if (vertices == header.elements.end()) refuse("it has no vertices");
+  PolygonMesh mesh;
   Rows rows(content, header.encoding);
   for (const Element& element : header.elements) {
     if (&element == &*vertices) {

@@ -228,19 +228,6 @@ TEST_F(MeshFiles, ObjWithIndentedLinesCommentsAndContinuedOnes) {
   expectUnitCube(loadMesh(write("indented.obj", "  # part\n   " + obj)));
 }
 
-// Assimp reads 16 MiB at a time, and seeks to where it is before each block.
-TEST_F(MeshFiles, ObjWhoseLineGoesOnInTheNextBlock) {
-  constexpr std::size_t kBlock = std::size_t{16} << 20U;
-  const std::string obj = cubeObj();
-  const std::size_t face = obj.find("\nf") + 1;
-  for (const std::size_t inLine : {obj.find(' ', face) - face, std::size_t{0}}) {
-    std::string large = obj.substr(0, face);
-    large += "#" + std::string(kBlock - large.size() - inLine - 2, 'x') + "\n" + obj.substr(face);
-    ASSERT_TRUE(inLine == 0 || large[kBlock] == ' ');
-    expectUnitCube(loadMesh(write("large.obj", large)));
-  }
-}
-
 TEST_F(MeshFiles, ObjWhoseCommentEndsInABackslash) {
   std::string obj = cubeObj();
   for (std::size_t at = obj.find("\nf"); at != std::string::npos; at = obj.find("\nf", at + 3))

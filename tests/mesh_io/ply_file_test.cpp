@@ -39,7 +39,7 @@ std::string binary(bool big, std::initializer_list<T> values) {
   return out;
 }
 
-void expectTwoFaces(const PlyMesh& mesh) {
+void expectTwoFaces(const PolygonMesh& mesh) {
   EXPECT_THAT(mesh.vertices, ElementsAre(Vec3f(0, 0, 0), Vec3f(1, 0, 0), Vec3f(0, 1, 0), Vec3f(1, 1, 2)));
   EXPECT_THAT(mesh.sizes, ElementsAre(3, 4));
   EXPECT_THAT(mesh.corners, ElementsAre(0, 1, 2, 0, 1, 3, 2));
@@ -92,7 +92,7 @@ TEST(Ply, BothByteOrdersAndAllTypes) {
 
 TEST(Ply, DataMayBeginWithTheByteOfALineFeed) {
   const std::string ten = std::string("\n\0\x80\x3f", 4);  // a float
-  const PlyMesh mesh = parsePly(
+  const PolygonMesh mesh = parsePly(
       "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
       "property float z\nend_header\n" +
       ten + ten + ten);
@@ -104,7 +104,7 @@ TEST(Ply, FacesMayPrecedeVertices) {
 }
 
 TEST(Ply, StripsAlternateAndBeginAnew) {
-  const PlyMesh mesh =
+  const PolygonMesh mesh =
       parsePly(text(kVertices + "element tristrips 1\nproperty list int int vertex_indices\n",
                     kTextVertices + "9 0 1 2 3 -1 3 2 2 1\n"));
   EXPECT_THAT(mesh.sizes, ElementsAre(3, 3));
@@ -143,7 +143,7 @@ TEST(Ply, ErrorsNameThePlace) {
 }
 
 TEST(Ply, NumbersThatNoDoubleHoldsAreInfiniteOrZero) {
-  const PlyMesh mesh = parsePly(text(
+  const PolygonMesh mesh = parsePly(text(
       "element vertex 1\nproperty double x\nproperty float y\nproperty float z\n", "-1e999 1e-999 +2.5e0\n"));
   EXPECT_THAT(mesh.vertices.at(0).x(), -std::numeric_limits<float>::infinity());
   EXPECT_THAT(mesh.vertices.at(0).y(), 0);
