@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <assimp/IOStream.hpp>
 #include <charconv>
+#include <nlohmann/json.hpp>
 #include <span>
-#include <stdexcept>
 #include <utility>
+
+#include "mesh_io/polygons.h"
 
 namespace hapticd::mesh_io {
 namespace {
@@ -49,20 +51,38 @@ std::string readNext(Assimp::IOStream& file, std::size_t most) {
   return text;
 }
 
-// Assimp takes whole numbers for the bits of floats where an extension says that they are none.
-void refuseUnknownMeshes(std::string_view json) {
-  const std::size_t list = json.find("\"extensionsRequired\"");
-  if (list == std::string_view::npos) return;
-  std::string_view names = json.substr(list);
-  names = names.substr(0, names.find(']'));
-  names.remove_prefix(std::min(names.size(), names.find('[')));
-  for (std::size_t open = names.find('"'); open != std::string_view::npos; open = names.find('"')) {
-    names.remove_prefix(open + 1);
-    const std::string_view name = names.substr(0, names.find('"'));
-    names.remove_prefix(std::min(names.size(), name.size() + 1));
-    if (name.find("mesh") != std::string_view::npos && name != "KHR_draco_mesh_compression")
-      throw std::runtime_error("it requires the extension " + std::string(name) +
-                               ", which is not supported: save it without");
+using Json = nlohmann::json;
+
+// A member or an element; null where there is none.
+const Json& in(const Json& json, const char* name) {
+  static const Json null;
+  const auto found = json.find(name);
+  return found == json.end() ? null : *found;
+}
+const Json& in(const Json& json, const Json& index) {
+  static const Json null;
+  if (!json.is_array() || !index.is_number_unsigned() || index.get<std::size_t>() >= json.size()) return null;
+  return json[index.get<std::size_t>()];
+}
+
+// Assimp takes whole numbers for the bits of floats where an extension says that they are none, and positions
+// of sparse accessors from memory that nobody wrote. A text that is no JSON is for Assimp to refuse.
+void refuseUnknownMeshes(std::string_view text) {
+  const Json json = Json::parse(text, nullptr, false);
+  for (const Json& one : in(json, "extensionsRequired")) {
+    const std::string name = one.is_string() ? one.get<std::string>() : "";
+    if (name.find("mesh") != std::string::npos && name != "KHR_draco_mesh_compression")
+      refuse("it requires the extension " + name + ", which is not supported: save it without");
+  }
+  for (const Json& mesh : in(json, "meshes")) {
+    for (const Json& primitive : in(mesh, "primitives")) {
+      for (const auto& [what, index] : {std::pair{"positions", in(in(primitive, "attributes"), "POSITION")},
+                                        {"corners", in(primitive, "indices")}}) {
+        if (in(in(json, "accessors"), index).contains("sparse"))
+          refuse(std::string("its ") + what +
+                 " are a sparse accessor, which is not supported: save it without");
+      }
+    }
   }
 }
 
@@ -77,10 +97,10 @@ bool isUtf16(std::string_view head) {
 void refuseWhatAssimpMisreads(Assimp::IOStream& file, const std::string& format) {
   constexpr std::size_t kGlbHeader = 20;
   const std::string head = readNext(file, kGlbHeader);
-  if (isUtf16(head)) throw std::runtime_error("it is a text in UTF-16: save it in UTF-8");
+  if (isUtf16(head)) refuse("it is a text in UTF-16: save it in UTF-8");
   if (format == "gltf") refuseUnknownMeshes(head + readNext(file, file.FileSize()));
   if (format != "glb" || head.size() < kGlbHeader) return;
-  if (head.starts_with("glTF\1")) throw std::runtime_error("it is glTF 1: save it as glTF 2");
+  if (head.starts_with("glTF\1")) refuse("it is glTF 1: save it as glTF 2");
   std::size_t size = 0;
   for (std::size_t i = 16; i > 12; --i) size = size << 8U | static_cast<unsigned char>(head[i - 1]);
   refuseUnknownMeshes(readNext(file, size));

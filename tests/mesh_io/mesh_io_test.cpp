@@ -268,6 +268,23 @@ TEST_F(MeshFiles, AGltfThatRequiresUnknownMeshesIsRefused) {
   expectUnitCube(loadMesh(write("textures.glb", glb(requiring(json, R"("KHR_texture_basisu")")))));
 }
 
+// Assimp reads positions from memory that nobody wrote. The shapes that a mesh may blend into are not read.
+TEST_F(MeshFiles, AGltfWithSparsePositionsIsRefused) {
+  const auto with = [](const std::string& before, const std::string& inserted) {
+    std::string json = gltfJson("", R"([{"mesh":0}])");
+    return json.insert(json.find(before), inserted);
+  };
+  const std::string sparse =
+      R"("sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}})";
+  EXPECT_THAT(
+      errorOf(write("sparse.glb", glb(with(R"("min":[0,0,0])", sparse + ",")))),
+      HasSubstr("sparse.glb': its positions are a sparse accessor, which is not supported: save it without"));
+  std::string blends =
+      with("],\n\"bufferViews\"", R"(,{"componentType":5126,"count":8,"type":"VEC3",)" + sparse + "}");
+  blends.insert(blends.find(R"(,"indices")"), R"(,"targets":[{"POSITION":2}])");
+  expectUnitCube(loadMesh(write("blends.glb", glb(blends))));
+}
+
 TEST_F(MeshFiles, AGltfWhoseBufferHasASpaceInItsName) {
   write("my cube%.bin", gltfData());
   expectUnitCube(loadMesh(write("cube.gltf", gltfJson(R"("uri":"my%20cube%25.bin",)", R"([{"mesh":0}])"))));
