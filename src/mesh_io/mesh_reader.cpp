@@ -21,6 +21,7 @@
 #include "mesh_io/assimp_gaps.h"
 #include "mesh_io/obj_file.h"
 #include "mesh_io/ply_file.h"
+#include "mesh_io/triangulation.h"
 
 namespace hapticd::mesh_io {
 namespace {
@@ -65,53 +66,12 @@ class OnlyGeometry final : public Assimp::DefaultIOSystem {
   const std::string format_;
 };
 
-// Assimp's own readers of PLY and OBJ lose or invent triangles, and that of PLY crashes. Polygons are for
-// Assimp to divide.
-class PolygonImporter final : public Assimp::BaseImporter {
- public:
-  using Parse = PolygonMesh(std::string_view bytes);
-  explicit PolygonImporter(Parse* parse) : parse_(parse) {}
-  bool CanRead(const std::string&, Assimp::IOSystem*, bool) const override { return true; }
+// Assimp's own readers of PLY and OBJ lose or invent triangles, and that of PLY crashes.
+using Parse = PolygonMesh(std::string_view bytes);
 
- protected:
-  const aiImporterDesc* GetInfo() const override {
-    static const aiImporterDesc info{"polygons", "", "", "", 0, 0, 0, 0, 0, "obj ply"};
-    return &info;
-  }
-  void InternReadFile(const std::string& name, aiScene* scene, Assimp::IOSystem* files) override {
-    const std::unique_ptr<Assimp::IOStream> file(files->Open(name));
-    if (!file) throw std::runtime_error("it cannot be read");
-    std::string bytes(file->FileSize(), '\0');
-    bytes.resize(file->Read(bytes.data(), 1, bytes.size()));
-    const PolygonMesh polygons = parse_(bytes);
-    auto mesh = std::make_unique<aiMesh>();
-    mesh->mNumVertices = static_cast<unsigned>(polygons.vertices.size());
-    mesh->mVertices = new aiVector3D[polygons.vertices.size()];
-    for (std::size_t i = 0; i < polygons.vertices.size(); ++i)
-      mesh->mVertices[i] = {polygons.vertices[i].x(), polygons.vertices[i].y(), polygons.vertices[i].z()};
-    mesh->mFaces = new aiFace[polygons.sizes.size()];
-    mesh->mNumFaces = static_cast<unsigned>(polygons.sizes.size());
-    const std::uint32_t* corner = polygons.corners.data();
-    for (std::size_t i = 0; i < polygons.sizes.size(); ++i) {
-      aiFace& face = mesh->mFaces[i];
-      face.mIndices = new unsigned[polygons.sizes[i]];
-      face.mNumIndices = polygons.sizes[i];
-      std::copy_n(corner, polygons.sizes[i], face.mIndices);
-      corner += polygons.sizes[i];
-    }
-    if (polygons.sizes.empty()) throw std::runtime_error("it holds no triangles");
-    scene->mRootNode = new aiNode;
-    scene->mRootNode->mMeshes = new unsigned[1]{0};
-    scene->mRootNode->mNumMeshes = 1;
-    scene->mMeshes = new aiMesh* [1] { mesh.release() };
-    scene->mNumMeshes = 1;
-    scene->mMaterials = new aiMaterial* [1] { new aiMaterial };
-    scene->mNumMaterials = 1;
-  }
-
- private:
-  Parse* const parse_;
-};
+Parse* parserOf(const std::string& format) {
+  return format == "ply" ? parsePly : format == "obj" ? parseObj : nullptr;
+}
 
 // Assimp leaves out triangles of a glTF whose corners do not exist, and tells only its log.
 class DroppedFaces {
@@ -141,15 +101,13 @@ class DroppedFaces {
 
 // Assimp tries readers by content, too; those of other formats are removed.
 void keepOnly(Assimp::Importer& importer, const std::string& format) {
-  PolygonImporter::Parse* const parse = format == "ply" ? parsePly : format == "obj" ? parseObj : nullptr;
   for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
     Assimp::BaseImporter* reader = importer.GetImporter(i);
     const std::string extensions = ' ' + std::string(importer.GetImporterInfo(i)->mFileExtensions) + ' ';
-    if (parse == nullptr && extensions.find(' ' + format + ' ') != std::string::npos) continue;
+    if (extensions.find(' ' + format + ' ') != std::string::npos) continue;
     importer.UnregisterLoader(reader);
     delete reader;
   }
-  if (parse != nullptr) importer.RegisterLoader(new PolygonImporter(parse));
 }
 
 void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_node) {
@@ -200,6 +158,29 @@ std::string explained(const std::string& reason, const std::string& format) {
   return reason.empty() ? "it cannot be read" : reason;
 }
 
+TriangleMesh throughAssimp(const std::filesystem::path& file, const std::string& format) {
+  Assimp::Importer importer;
+  keepOnly(importer, format);
+  importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
+  const DroppedFaces dropped;
+  // Only positions matter.
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                              aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
+                                  aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
+                                  aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS |
+                                  aiComponent_MATERIALS);
+  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_RemoveComponent);
+  if (scene == nullptr || scene->mRootNode == nullptr) {
+    const std::string reason = importer.GetErrorString();
+    if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+    throw std::runtime_error(explained(reason, format));
+  }
+  if (dropped.any()) throw std::runtime_error(kNoSuchCorner);
+  TriangleMesh mesh;
+  appendNode(mesh, *scene, *scene->mRootNode, aiMatrix4x4(), 0);
+  return mesh;
+}
+
 }  // namespace
 
 bool isSupported(const std::filesystem::path& file) {
@@ -208,29 +189,18 @@ bool isSupported(const std::filesystem::path& file) {
 
 TriangleMesh readMesh(const std::filesystem::path& file) {
   const std::string format = formatOf(file);
-  Assimp::Importer importer;
-  keepOnly(importer, format);
-  importer.SetIOHandler(new OnlyGeometry(file));  // which the importer deletes
-  if (const std::unique_ptr<Assimp::IOStream> content(importer.GetIOHandler()->Open(file.c_str(), "rb"));
-      content)
-    refuseWhatAssimpMisreads(*content, format);
-  const DroppedFaces dropped;
-  // Only positions matter.
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
-                              aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
-                                  aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
-                                  aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS |
-                                  aiComponent_MATERIALS);
-  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_RemoveComponent);
-  if (scene == nullptr || scene->mRootNode == nullptr) {
-    const std::string reason = importer.GetErrorString();
-    if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-    throw std::runtime_error(explained(reason, format));
-  }
-  if (dropped.any()) throw std::runtime_error(kNoSuchCorner);
-
+  const std::unique_ptr<Assimp::IOStream> content(OnlyGeometry(file).Open(file.c_str(), "rb"));
+  if (!content) throw std::runtime_error("it cannot be read");
+  refuseWhatAssimpMisreads(*content, format);
   TriangleMesh mesh;
-  appendNode(mesh, *scene, *scene->mRootNode, aiMatrix4x4(), 0);
+  if (Parse* const parse = parserOf(format)) {
+    content->Seek(0, aiOrigin_SET);
+    std::string bytes(content->FileSize(), '\0');
+    bytes.resize(content->Read(bytes.data(), 1, bytes.size()));
+    mesh = triangulated(parse(bytes));
+  } else {
+    mesh = throughAssimp(file, format);
+  }
   if (mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
   geometry::weld(mesh);
   return mesh;
