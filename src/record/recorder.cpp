@@ -25,6 +25,10 @@ Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const Record
     file_ = base::world().files.create(path_, base::Existing::refuse);
   } catch (const std::system_error& error) {
     const std::string what = "cannot record to '" + path_.string() + "': " + error.code().message();
+    std::error_code none;
+    if (std::filesystem::is_other(path_, none))
+      throw RecordingExists("cannot record to '" + path_.string() +
+                            "': it is a device or a pipe; name a file");
     if (error.code() == std::errc::file_exists) throw RecordingExists(what + "; name another");
     if (error.code() == std::errc::is_a_directory) throw RecordingExists(what + "; name a file");
     throw RecordingError(what + "; name a file in a directory that can be written");
