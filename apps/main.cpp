@@ -1,6 +1,7 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
 #include <fcntl.h>
 #include <pthread.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -103,6 +104,11 @@ void openStandardStreams() {
 // crash. 8 MB are the default of Linux.
 void giveThreadsStack() {
   constexpr std::size_t kStack_bytes = 8U << 20U;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur < kStack_bytes) {
+    limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, kStack_bytes);
+    setrlimit(RLIMIT_STACK, &limit);  // of the main thread
+  }
   pthread_attr_t attributes;
   if (pthread_getattr_default_np(&attributes) != 0) return;
   std::size_t given = 0;

@@ -10,10 +10,15 @@ serves() { # serves HOW COMMAND...: a server that COMMAND starts with these argu
   local how=$1 status=0
   shift
   rm -f "$work/r.haptics"
-  "$@" "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt --record "$work/r.haptics" --seconds 0.5 >"$work/log" 2>&1 || status=$?
+  "$@" "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt "${device[@]}" --record "$work/r.haptics" --seconds 0.5 >"$work/log" 2>&1 || status=$?
   [ "$status" = 0 ] && "$hapticd" info "$work/r.haptics" | grep -q '^  ticks     [1-9]' || { cat "$work/log"; echo "$how: status $status"; exit 1; }
 }
 limited() { (ulimit "$1" "$2"; shift 2; exec "$@"); }
+device=(--device openhaptics --isolate)
+export HAPTICD_HDAPI_LIB=$3
+for stack_kB in 128 256 1024; do serves "isolated, stack of $stack_kB kB" limited -s "$stack_kB"; done
+serves "isolated, 24 descriptors" limited -n 24
+device=(--device simulated)
 for stack_kB in 64 256 1024; do serves "stack of $stack_kB kB" limited -s "$stack_kB"; done
 serves "20 descriptors" limited -n 20
 serves "no core" limited -c 0
