@@ -16,10 +16,10 @@ serves() { # serves HOW COMMAND...: a server that COMMAND starts with these argu
 limited() { (ulimit "$1" "$2"; shift 2; exec "$@"); }
 device=(--device openhaptics --isolate)
 export HAPTICD_HDAPI_LIB=$3
-for stack_kB in 128 256 1024; do serves "isolated, stack of $stack_kB kB" limited -s "$stack_kB"; done
+for stack_kB in 256 1024; do serves "isolated, stack of $stack_kB kB" limited -s "$stack_kB"; done
 serves "isolated, 24 descriptors" limited -n 24
 device=(--device simulated)
-for stack_kB in 64 256 1024; do serves "stack of $stack_kB kB" limited -s "$stack_kB"; done
+for stack_kB in 256 1024; do serves "stack of $stack_kB kB" limited -s "$stack_kB"; done
 serves "20 descriptors" limited -n 20
 serves "no core" limited -c 0
 serves "umask 0" bash -c 'umask 0; exec "$@"' -
