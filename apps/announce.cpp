@@ -31,6 +31,8 @@ void logAddresses(const server::Server& server, const server::ServerConfig& conf
         !server.fingerprint().empty() && (config.tlsLoopback || !net::isLoopback(page.address));
     spdlog::info("viewer: {}://{}/", secured ? "https" : "http", page.text());
   }
+  if (const auto haply = server.haplyAddress())
+    spdlog::info("programs for Haply devices: ws://{}", reachedFromHere(*haply).text());
 }
 
 std::unique_ptr<zeroconf::Announcer> announceOnNetwork(const server::Server& server,

@@ -70,8 +70,10 @@ inline CLI::Validator existingFile() {
       "FILE");
 }
 /// Throws std::runtime_error when the file exists and `force` is not given, or is `input`, which is still to
-/// be read. Pipes and devices may be written.
+/// be read. Pipes and devices may be written. Of "-" one would expect standard output, which has other text.
 inline void keepFile(const std::string& file, bool force, const std::string& input = {}) {
+  if (file == "-")
+    throw std::runtime_error("'-' would be a file of that name: name another, or this one by ./-");
   std::error_code none;
   if (!file.empty() && !input.empty() && std::filesystem::equivalent(file, input, none))
     throw std::runtime_error("'" + file + "' is the file to read: choose another name for what is written");

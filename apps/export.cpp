@@ -1,4 +1,7 @@
 // hapticd export: converts a recording for other programs.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -79,8 +82,23 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
   remark = reader.remark();
 }
 
-int run(const ExportOptions& options) {
+// The name of the pipe, terminal or device behind "-". Into a file, the shell's redirection would write over
+// or into what is there, and without the one beside it.
+std::string standardOutput(bool json) {
+  const std::string out = "/dev/stdout";
+  if (json)
+    throw std::runtime_error("--json and '-o -' both write to standard output: leave one of them out");
+  std::error_code none;
+  if (std::filesystem::is_regular_file(out, none))
+    throw std::runtime_error("'-o -' is for pipes, and standard output is a file: name it by -o FILE");
+  const int mode = ::fcntl(STDOUT_FILENO, F_GETFL);
+  if (mode < 0 || (mode & O_ACCMODE) == O_RDONLY) throw std::runtime_error(kNotWritten);
+  return out;
+}
+
+int run(ExportOptions options) {
   const StopSignals signals;
+  if (options.out == "-") options.out = standardOutput(options.json);
   keepFile(options.out, options.force, options.recording);
   std::error_code none;
   const auto out = std::filesystem::status(options.out, none);
@@ -95,7 +113,7 @@ int run(const ExportOptions& options) {
     std::optional<record::ExportFile> besideFile;
     if (!beside.empty()) {
       besideFile.emplace(beside, kDropped);
-      besideFile->write(record::sidecarOf(options.recording, throwIfStopped));
+      besideFile->write(record::sidecarOf(options.recording, throwIfStopped).json);
       besideFile->flush();
     }
     if (options.to == "csv") {
@@ -132,7 +150,8 @@ void addExport(CLI::App& app) {
   command->add_option("--to", options->to, "mcap, csv or vrpn")
       ->required()
       ->check(CLI::IsMember({"mcap", "csv", "vrpn"}));
-  command->add_option("-o,--out", options->out, "File to write")->required();
+  command->add_option("-o,--out", options->out, "File to write; - for standard output, into a pipe")
+      ->required();
   command->add_flag("--force", options->force, kForceText);
   command->add_flag("--json", options->json, kJsonText);
   command->footer(

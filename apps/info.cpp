@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -107,9 +106,9 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device, base:
 
 int run(const std::string& file, bool config, bool json) {
   if (json) {
-    const std::string text = record::sidecarOf(file);
-    std::fputs(text.c_str(), stdout);
-    return statusFor(nlohmann::json::parse(text).at("remark"));
+    const record::Sidecar sidecar = record::sidecarOf(file);
+    std::fputs(sidecar.json.c_str(), stdout);
+    return statusFor(sidecar.remark);
   }
   record::RecordingReader reader(file);
   const record::RecordingHeader& header = reader.header();

@@ -1,5 +1,7 @@
 // hapticd: a haptics server that speaks VRPN, and the tools around it.
 #include <fcntl.h>
+#include <pthread.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -89,11 +91,31 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   return 2;
 }
 
-// The next file or socket would take the number of a standard stream that is closed, and its messages.
+// The next file or socket would take the number of a standard stream that is closed, and its messages. What
+// is printed to a closed standard output fails, as on a full disk.
 void openStandardStreams() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(fd, F_GETFD) < 0) static_cast<void>(::open("/dev/null", O_RDWR));
+    const int mode = fd == STDERR_FILENO ? O_RDWR : O_RDONLY;
+    if (::fcntl(fd, F_GETFD) < 0) static_cast<void>(::open("/dev/null", mode));
   }
+}
+
+// 'ulimit -s' is the stack of each thread, too: the servo loop, which uses more than a small one has, would
+// crash. 8 MB are the default of Linux.
+void giveThreadsStack() {
+  constexpr std::size_t kStack_bytes = 8U << 20U;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur < kStack_bytes) {
+    limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, kStack_bytes);
+    setrlimit(RLIMIT_STACK, &limit);  // of the main thread
+  }
+  pthread_attr_t attributes;
+  if (pthread_getattr_default_np(&attributes) != 0) return;
+  std::size_t given = 0;
+  if (pthread_attr_getstacksize(&attributes, &given) == 0 && given < kStack_bytes &&
+      pthread_attr_setstacksize(&attributes, kStack_bytes) == 0)
+    pthread_setattr_default_np(&attributes);
+  pthread_attr_destroy(&attributes);
 }
 
 // The words in the order in which CLI11 takes them: the last first. "help COMMAND" is "COMMAND --help".
@@ -112,6 +134,7 @@ std::vector<std::string> wordsOf(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace hapticd::apps;
   openStandardStreams();
+  giveThreadsStack();
   CLI::App app{
       "hapticd: a haptics server that speaks VRPN.\n"
       "One process owns a haptic device, takes a scene from any VRPN client, renders forces at 1 kHz\n"

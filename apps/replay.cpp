@@ -1,6 +1,7 @@
 // hapticd replay: serves a recording to clients as if it were live.
 #include <spdlog/spdlog.h>
 
+#include <cstdio>
 #include <memory>
 #include <string>
 
@@ -35,6 +36,7 @@ int run(const ReplayOptions& options) {
   config.seconds = options.seconds;
   server::validate(config);
 
+  const server::Player& played = *player;
   server::Server server(config, std::move(player));
   logAddresses(server, config, "replay");
   const std::unique_ptr<zeroconf::Announcer> announcer = announceOnNetwork(server, config);
@@ -44,7 +46,9 @@ int run(const ReplayOptions& options) {
   stopper.watch(server);
   server.run();
   stopper.finish();
-  return 0;
+  const std::string remark = played.remark();
+  if (!remark.empty()) std::fprintf(stderr, "hapticd: %s\n", remark.c_str());
+  return statusFor(remark);
 }
 
 }  // namespace

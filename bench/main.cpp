@@ -60,7 +60,6 @@ int printed() {
 }
 
 void write(const std::filesystem::path& directory, const std::vector<Measured>& all, Length length) {
-  std::filesystem::create_directories(directory);
   const auto machine = describeMachine(length);
   writeJson(directory / "results.json", all, machine);
   writeCsv(directory / "results.csv", all);
@@ -86,6 +85,7 @@ int run(const Options& options) {
   run.length = options.longest ? Length::longest : options.full ? Length::full : Length::windows;
   for (const std::string& line : describeMachine(run.length)) std::printf("%s\n", line.c_str());
   std::vector<Measured> all;
+  int status = 0;
   for (const Benchmark* benchmark : toRun) {
     run.progress = [&](const std::string& text) {
       std::fprintf(stderr, "[%s] %s\n", benchmark->name.c_str(), text.c_str());
@@ -96,6 +96,7 @@ int run(const Options& options) {
       measured.outcome = benchmark->measure(run);
     } catch (const std::exception& error) {
       // One failed benchmark does not stop the others.
+      status = 1;
       measured.outcome.remarks.push_back(std::string("NOT MEASURED: ") + error.what());
     }
     measured.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -105,7 +106,7 @@ int run(const Options& options) {
     // After each, so that an interrupted run leaves what it has.
     if (!options.out.empty()) write(options.out, all, run.length);
   }
-  return printed();
+  return std::max(status, printed());
 }
 
 void declare(CLI::App& app, Options& options) {

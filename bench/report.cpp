@@ -200,7 +200,6 @@ void writeCsv(const std::filesystem::path& file, const std::vector<Measured>& al
 }
 
 void writeFigures(const std::filesystem::path& directory, const std::vector<Measured>& all) {
-  std::filesystem::create_directories(directory / "figures");
   for (const Measured& measured : all) {
     for (const Figure& figure : measured.outcome.figures) {
       writeFile(directory / "figures" / (figure.file + ".svg"), asSvg(figure));

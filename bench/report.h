@@ -26,7 +26,7 @@ std::string asMarkdown(const std::vector<Measured>& all, const std::vector<std::
 void writeJson(const std::filesystem::path& file, const std::vector<Measured>& all,
                const std::vector<std::string>& machine);
 void writeCsv(const std::filesystem::path& file, const std::vector<Measured>& all);
-/// Into `directory`/figures, as asMarkdown() links them.
+/// Into `directory`/figures, which is there, as asMarkdown() links them.
 void writeFigures(const std::filesystem::path& directory, const std::vector<Measured>& all);
 void writeFile(const std::filesystem::path& file, const std::string& text);
 

@@ -8,7 +8,9 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <system_error>
 #include <thread>
+#include <utility>
 
 #include "base/world.h"
 
@@ -108,6 +110,17 @@ class SystemPacedThread final : public PacedThread::Impl {
   std::thread thread_;
 };
 
+// The error of the system is the same for a lack of processes and of memory, and has no remedy.
+template <typename T, typename... Rest>
+std::unique_ptr<T> started(const ThreadOptions& options, Rest&&... rest) {
+  try {
+    return std::make_unique<T>(options, std::forward<Rest>(rest)...);
+  } catch (const std::system_error& error) {
+    throw std::system_error(error.code(), "cannot start the thread '" + options.name +
+                                              "'; raise the limits 'ulimit -u' and 'ulimit -v'");
+  }
+}
+
 }  // namespace
 
 Thread::Thread(ThreadOptions options, Step step)
@@ -135,16 +148,16 @@ PacedThread::PacedThread(ThreadOptions options, Clock& clock, Step step)
     : impl_(world().threads.startPaced(std::move(options), clock, std::move(step))) {}
 
 std::unique_ptr<Thread::Impl> SystemThreads::start(ThreadOptions options, Step step) {
-  return std::make_unique<SystemThread>(std::move(options), std::move(step));
+  return started<SystemThread>(options, std::move(step));
 }
 
 std::unique_ptr<BlockingThread::Impl> SystemThreads::startBlocking(ThreadOptions options,
                                                                    std::function<void()> body) {
-  return std::make_unique<SystemBlockingThread>(std::move(options), std::move(body));
+  return started<SystemBlockingThread>(options, std::move(body));
 }
 
 std::unique_ptr<PacedThread::Impl> SystemThreads::startPaced(ThreadOptions options, Clock& clock, Step step) {
-  return std::make_unique<SystemPacedThread>(std::move(options), clock, std::move(step));
+  return started<SystemPacedThread>(options, clock, std::move(step));
 }
 
 }  // namespace hapticd::base

@@ -65,14 +65,19 @@ class AsioListener final : public Acceptor {
   int acceptOne() override {
     tcp::socket socket(loop_.context);
     error_code error;
-    acceptor_.accept(socket, error);
+    tcp::endpoint remote;  // also of a peer that is gone already
+    if (isLocal_) {
+      acceptor_.accept(socket, error);
+    } else {
+      acceptor_.accept(socket, remote, error);
+    }
     if (error) return error.value();
     loop_.guard([&] {
       auto impl = std::make_shared<TcpConnection>(loop_, options_);
       if (isLocal_) {
         impl->adoptLocal(std::move(socket));
       } else {
-        impl->adopt(std::move(socket));
+        impl->adopt(std::move(socket), fromAsio(remote));
       }
       onAccept_(Connection(std::move(impl)));
     });

@@ -67,8 +67,9 @@ void TcpConnection::connect(const Endpoint& peer, std::chrono::milliseconds time
   });
 }
 
-void TcpConnection::adopt(Socket socket) {
+void TcpConnection::adopt(Socket socket, const Endpoint& remote) {
   socket_ = std::move(socket);
+  remote_ = remote;
   becomeOpen();
 }
 
@@ -95,7 +96,7 @@ void TcpConnection::becomeOpen() {
   socket_.non_blocking(true, error);
   local_ = fromAsio(socket_.local_endpoint(error));
   const tcp::endpoint remote = socket_.remote_endpoint(error);
-  if (!error) {  // a peer that is gone already has no address; the first read reports its end
+  if (!error) {  // the socket of a peer that is gone already knows none; the first read reports its end
     remote_ = fromAsio(remote);
   }
   applyOptions();

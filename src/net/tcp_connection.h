@@ -24,8 +24,8 @@ class TcpConnection final : public Connection::Impl,
   TcpConnection(AsioLoop& loop, const ConnectionOptions& options);
 
   void connect(const Endpoint& peer, std::chrono::milliseconds timeout);
-  /// Takes over an accepted socket; its reading waits for start().
-  void adopt(Socket socket);
+  /// Takes over an accepted socket of this peer; its reading waits for start().
+  void adopt(Socket socket, const Endpoint& remote);
   /// The same for a Unix-domain stream socket, which behaves as one of TCP without addresses.
   void adoptLocal(Socket socket);
   void adoptLocal(int fd);

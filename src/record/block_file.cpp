@@ -42,6 +42,8 @@ BlockReader::BlockReader(const std::filesystem::path& file) {
   const auto status = std::filesystem::status(file, none);
   if (std::filesystem::is_fifo(status) || std::filesystem::is_socket(status))
     throw RecordingError(name + " is a pipe: copy it to a file first");
+  if (std::filesystem::is_other(status))
+    throw RecordingError(name + " is a device, not a recording; 'hapticd serve --record FILE' writes one");
   try {
     file_ = base::world().files.open(file);
     size_ = file_->size();

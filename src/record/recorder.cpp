@@ -4,6 +4,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "base/wall_offset.h"
 #include "base/world.h"
 #include "record/block_file.h"
 #include "record/fields.h"
@@ -15,7 +16,6 @@ namespace {
 constexpr Nanos kPeriod = 20'000'000;  // a crash loses no more than this
 constexpr Nanos kBetweenLossReports = 1'000'000'000;
 constexpr Nanos kBetweenLooks = 1'000'000'000;
-constexpr Nanos kWallStep = 1'000'000;  // as in time stamps on the wire
 
 }  // namespace
 
@@ -25,6 +25,10 @@ Recorder::Recorder(std::filesystem::path file, OnProblem onProblem, const Record
     file_ = base::world().files.create(path_, base::Existing::refuse);
   } catch (const std::system_error& error) {
     const std::string what = "cannot record to '" + path_.string() + "': " + error.code().message();
+    std::error_code none;
+    if (std::filesystem::is_other(path_, none))
+      throw RecordingExists("cannot record to '" + path_.string() +
+                            "': it is a device or a pipe; name a file");
     if (error.code() == std::errc::file_exists) throw RecordingExists(what + "; name another");
     if (error.code() == std::errc::is_a_directory) throw RecordingExists(what + "; name a file");
     throw RecordingError(what + "; name a file in a directory that can be written");
@@ -39,7 +43,7 @@ std::uint32_t Recorder::addDevice(RecordedDevice device) {
 
 void Recorder::start(Nanos wallOffset, std::string config) {
   wallOffset_ = wallOffset;
-  measuredWall_ = base::wallNow() - base::now();
+  measuredWall_ = base::wallOffset();
   Bytes content;
   Packer pack(content);
   pack.put(kFormatVersion);
@@ -136,10 +140,10 @@ void Recorder::appendEvent(BlockKind kind, Bytes&& content) {
 
 void Recorder::followWallClock() {
   const Nanos now = base::now();
-  const Nanos wall = base::wallNow();
-  if (base::now() - now > kWallStep / 2) return;  // interrupted between the two
-  const Nanos step = wall - now - measuredWall_;
-  if (std::abs(step) <= kWallStep) return;
+  const std::optional<Nanos> measured = base::tryWallOffset();
+  if (!measured) return;
+  const Nanos step = *measured - measuredWall_;
+  if (std::abs(step) <= base::kWallStep) return;
   measuredWall_ += step;
   wallOffset_ += step;
   Bytes content;

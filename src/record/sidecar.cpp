@@ -101,7 +101,7 @@ Json devicesOf(const RecordingHeader& header) {
 
 }  // namespace
 
-std::string sidecarOf(const std::filesystem::path& recording, const std::function<void()>& beforeEach) {
+Sidecar sidecarOf(const std::filesystem::path& recording, const std::function<void()>& beforeEach) {
   RecordingReader reader(recording);
   const RecordingHeader& header = reader.header();
   // One builder for each scene: those of its further devices see the same commands.
@@ -140,7 +140,7 @@ std::string sidecarOf(const std::filesystem::path& recording, const std::functio
                     {"markers", std::move(markers)},
                     {"remark", reader.remark()},
                     {"config_toml", header.config}};
-  return all.dump(1, ' ', false, Json::error_handler_t::replace) + '\n';
+  return {all.dump(1, ' ', false, Json::error_handler_t::replace) + '\n', reader.remark()};
 }
 
 }  // namespace hapticd::record

@@ -66,7 +66,10 @@ RTCDevice device() {
     const char* config = std::getenv("HAPTICD_EMBREE");
     RTCDevice created = rtcNewDevice(config);
     if (created == nullptr) {
-      throw std::runtime_error("Embree did not start (error " + std::to_string(rtcGetDeviceError(nullptr)) +
+      const RTCError error = rtcGetDeviceError(nullptr);
+      if (error == RTC_ERROR_OUT_OF_MEMORY)
+        throw std::runtime_error("Embree did not start: out of memory; raise the limit ('ulimit -v')");
+      throw std::runtime_error("Embree did not start (error " + std::to_string(error) +
                                "); check the HAPTICD_EMBREE environment variable");
     }
     return created;

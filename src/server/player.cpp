@@ -109,7 +109,7 @@ std::optional<Nanos> Player::step() {
       if (!reader_) reader_ = std::make_unique<record::RecordingReader>(options_.file);
       readAhead();
       if (buffer_.empty()) {
-        endPass(reader_->ending());
+        endPass(reader_->ending(), reader_->remark());
         continue;
       }
       const auto next = buffer_.begin();
@@ -142,7 +142,7 @@ std::optional<Nanos> Player::step() {
       position_ = next->first;
       buffer_.erase(next);
     } catch (const record::RecordingError& error) {
-      endPass(error.what());
+      endPass(error.what(), error.what());
     }
     const std::lock_guard lock(mutex_);
     status_.position_s = base::toSeconds(position_ - begin_);
@@ -168,6 +168,11 @@ void Player::takeOrder() {
   status_.paused = paused_;
   status_.speed = speed_;
   status_.ended = ended_;
+}
+
+std::string Player::remark() const {
+  const std::lock_guard lock(mutex_);
+  return remark_;
 }
 
 void Player::readAhead() {
@@ -205,14 +210,18 @@ void Player::rewind() {
   skipTo_.reset();
 }
 
-// `remark`: why the file ended early; empty at its regular end.
-void Player::endPass(const std::string& remark) {
-  if (options_.loop && remark.empty() && started_ && position_ - begin_ >= kShortestLoop) {
+// `reason`: why the file ended early; empty at its regular end. `remark`: the same, and what it lacks before.
+void Player::endPass(const std::string& reason, const std::string& remark) {
+  {
+    const std::lock_guard lock(mutex_);
+    remark_ = remark;
+  }
+  if (options_.loop && reason.empty() && started_ && position_ - begin_ >= kShortestLoop) {
     rewind();
     return;
   }
   ended_ = true;
-  callbacks_.ended(remark);
+  callbacks_.ended(reason);
   reader_.reset();
   buffer_.clear();
   std::fill(newestRead_.begin(), newestRead_.end(), 0);

@@ -78,6 +78,8 @@ class Player {
   void order(const ReplayOrder& order);
   /// From any thread.
   ReplayStatus status() const;
+  /// What is missing of the recording, as far as passes have ended; empty: nothing. From any thread.
+  std::string remark() const;
 
  private:
   std::optional<base::Nanos> step();
@@ -85,7 +87,7 @@ class Player {
   void readAhead();
   bool isAhead() const;
   void rewind();
-  void endPass(const std::string& remark);
+  void endPass(const std::string& reason, const std::string& remark);
   void setPresent(base::Nanos recorded);
   base::Nanos liveTime(base::Nanos recorded) const;
   base::Nanos recordedTime(base::Nanos live) const;
@@ -116,6 +118,7 @@ class Player {
   mutable std::mutex mutex_;
   std::optional<ReplayOrder> order_;
   ReplayStatus status_;
+  std::string remark_;
 
   std::atomic<bool> stopping_{false};
   base::Thread scan_;

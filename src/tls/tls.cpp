@@ -297,13 +297,23 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
     stream_.send(std::move(buffer), net::Delivery::reliable);
   }
 
+  // Of a certificate that is checked, OpenSSL's reason does not say what is wrong with it.
+  std::string whyFailed() const {
+    const std::string why = reason();
+    const long verdict = SSL_get_verify_result(ssl_.get());
+    if (verdict == X509_V_OK || (SSL_get_verify_mode(ssl_.get()) & SSL_VERIFY_PEER) == 0) return why;
+    const bool ofTheTime = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED;
+    return why + ": " + X509_verify_cert_error_string(verdict) +
+           (ofTheTime ? ", or the clock of this machine is wrong" : "");
+  }
+
   void handshake() {
     ERR_clear_error();
     const int result = SSL_do_handshake(ssl_.get());
     const bool waits = SSL_get_error(ssl_.get(), result) == SSL_ERROR_WANT_READ;
     if (result == 1 && !isKnown()) return;
     if (result != 1 && !waits) {
-      const std::string why = reason();
+      const std::string why = whyFailed();
       flush();  // the alert names the reason to the peer
       return fail("TLS handshake failed: " + why);
     }

@@ -101,9 +101,40 @@ refused 1 "--force" "$hapticd" export "$recording" --to csv -o "$work/out.csv"
 # Into a pipe goes the file alone; what is closed is not taken for a file.
 "$hapticd" export "$recording" --to csv -o /dev/stdout 2>"$work/said" | cmp - "$work/out.csv"
 grep -qx "wrote /dev/stdout" "$work/said"
-"$hapticd" export "$recording" --to csv -o "$work/closed.csv" >&-
+for to in csv mcap vrpn; do
+  "$hapticd" export "$recording" --to $to -o "$work/whole.$to" >/dev/null
+  (cd "$work" && "$hapticd" export "$recording" --to $to -o - 2>said) | cmp - "$work/whole.$to"
+done
+refused 1 "both write to standard output" "$hapticd" export "$recording" --to csv -o - --json
+refused 1 "standard output is a file: name it by -o FILE" "$hapticd" export "$recording" --to csv -o -
+status=0
+"$hapticd" export "$recording" --to csv -o - >&- 2>"$work/said" || status=$?
+[ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+# Where there is other output, no file of this name surprises.
+(
+  cd "$work"
+  refused 1 "'-' would be a file of that name" "$hapticd" render --session "$recording" --out -
+  refused 1 "'-' would be a file of that name" "$hapticd" render --session "$recording" --report -
+  refused 1 "'-' must end with .svg or .pdf" "$hapticd" plot "$recording" --out -
+  refused 1 "'-' would be a file of that name" "$hapticd" record "Phantom@tcp://$address" -
+  refused 2 "record: '-' would be a file of that name" "$hapticd" serve --listen 127.0.0.1:0 --http off --record - --seconds 1
+  ls -- -* 2>&- && { echo "a file was written"; exit 1; }
+  "$hapticd" export "$recording" --to csv -o ./- --force >/dev/null
+  cmp ./- out.csv
+)
+status=0
+"$hapticd" export "$recording" --to csv -o "$work/closed.csv" >&- 2>"$work/said" || status=$?
+[ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
 cmp "$work/closed.csv" "$work/out.csv"
 refused 1 "is a pipe: copy it to a file first" "$hapticd" info <(cat "$recording")
+for command in info replay "render --session" "plot --out $work/null.svg"; do
+  refused 1 "'/dev/null' is a device, not a recording; 'hapticd serve --record FILE' writes one" "$hapticd" $command /dev/null
+done
+mkfifo "$work/pipe.haptics"
+for file in /dev/full "$work/pipe.haptics"; do
+  refused 1 "cannot record to '$file': it is a device or a pipe; name a file" "$hapticd" serve --listen 127.0.0.1:0 --http off --record "$file" --seconds 1
+done
+refused 1 "File exists; name another" "$hapticd" serve --listen 127.0.0.1:0 --http off --record "$work/out.csv.json" --seconds 1
 
 # Nor is what is still to be read, also with it.
 cp "$recording" "$work/kept.haptics"
@@ -130,6 +161,10 @@ for to in csv mcap vrpn; do
   refused 3 "everything before it was read" "$hapticd" export "$work/cut.haptics" --to $to -o "$work/cut.$to"
   [ -s "$work/cut.$to" ]
 done
+
+refused 3 "everything before it was read" "$hapticd" replay "$work/cut.haptics" --listen 127.0.0.1:0 --http off --speed 1000 --seconds 5
+grep -q '^hapticd: .*everything before it was read' "$work/said"
+"$hapticd" replay "$recording" --listen 127.0.0.1:0 --http off --speed 1000 --seconds 1 >/dev/null
 
 "$hapticd" info "$recording" >"$work/info"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||

@@ -11,6 +11,7 @@
 #include <optional>
 #include <semaphore>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -300,6 +301,37 @@ TEST(BlockingThread, DestructionAndMoveWaitForTheBody) {
   EXPECT_GE(ended, 2) << "the old one has ended";
   thread.join();
   EXPECT_EQ(ended, 3);
+}
+
+// A stack that no machine has: the kernel answers as to a lack of memory or processes.
+TEST(SystemThreads, ARefusalNamesTheThreadAndTheRemedy) {
+  pthread_attr_t usual;
+  ASSERT_EQ(pthread_getattr_default_np(&usual), 0);
+  pthread_attr_t huge;
+  pthread_attr_init(&huge);
+  ASSERT_EQ(pthread_attr_setstacksize(&huge, std::size_t{1} << 50U), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&huge), 0);
+  std::vector<std::string> errors;
+  const auto refused = [&](const auto& start) {
+    try {
+      start();
+    } catch (const std::system_error& error) {
+      errors.emplace_back(error.what());
+    }
+  };
+  Counted counted;
+  SimulatedClock clock;
+  refused([&] { const Thread thread({.name = "first"}, counted.step()); });
+  refused([&] { const PacedThread thread({.name = "second"}, clock, counted.step()); });
+  refused([] { const BlockingThread thread({.name = "third"}, [] {}); });
+  EXPECT_EQ(pthread_setattr_default_np(&usual), 0);
+  pthread_attr_destroy(&huge);
+  pthread_attr_destroy(&usual);
+  const std::string rest =
+      "'; raise the limits 'ulimit -u' and 'ulimit -v': Resource temporarily unavailable";
+  EXPECT_EQ(errors, (std::vector<std::string>{"cannot start the thread 'first" + rest,
+                                              "cannot start the thread 'second" + rest,
+                                              "cannot start the thread 'third" + rest}));
 }
 
 }  // namespace

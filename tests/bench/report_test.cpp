@@ -76,6 +76,7 @@ TEST(Report, markdownLinksTheFiguresWhereTheyAreWritten) {
   const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "bench_report";
   Measured with = measured();
   with.outcome.figures.push_back({"drawn", "A title", "us", 0, 100, {{"one", {}}}});
+  std::filesystem::create_directories(directory / "figures");
   writeFigures(directory, {with});
   const std::string text = asMarkdown({with}, {"a machine"});
   const std::string begin = "![A title](";

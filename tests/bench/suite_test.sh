@@ -26,6 +26,14 @@ for folder in "$work/file" "$work/file/results"; do
   [ ! -s "$work/output" ]
 done
 
+# A benchmark that cannot be measured, here for want of descriptors, is no success; what there is, is written.
+status=0
+(ulimit -n 10; exec "$hapticd" bench fanout --out "$work/new/results") >"$work/output" 2>"$work/error" || status=$?
+cat "$work/output" "$work/error"
+[ "$status" = 1 ]
+grep -q "NOT MEASURED: " "$work/output"
+grep -q "NOT MEASURED: " "$work/new/results/results.md"
+
 for what in --list "--list --json" --help; do
   status=0
   "$hapticd" bench $what >/dev/full 2>"$work/error" || status=$?  # unquoted: two options

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "net/loopback.h"
 
 namespace hapticd::net {
@@ -53,6 +55,18 @@ TEST(TcpListener, ThePortIsFreeAfterDestructionAlsoWithinItsCallback) {
   ASSERT_TRUE(pumpUntil(loop, [&] { return accepted; }));
   const TcpListener again(loop, local, [](Connection) {});
   EXPECT_EQ(again.local(), local);
+}
+
+// Its address decides who may come in, and stands in the log.
+TEST(TcpListener, KnowsTheAddressOfAPeerThatIsGoneAlready) {
+  Loop loop;
+  std::optional<Endpoint> remote;
+  const TcpListener listener(loop, kAnyPort,
+                             [&](const Connection& connection) { remote = connection.remote(); });
+  RawSocket::connectedFrom(7, listener.local()).reset();
+  ASSERT_TRUE(pumpUntil(loop, [&] { return remote.has_value(); }));
+  EXPECT_EQ(remote->addressText(), "127.0.0.7");
+  EXPECT_NE(remote->port, 0);
 }
 
 TEST(TcpListener, AcceptsEverythingThatWaitedWhileTheLoopDidNotRun) {

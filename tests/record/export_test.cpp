@@ -168,7 +168,7 @@ TEST(Json, NumbersThatAreNotFiniteAreNullAndLongListsAreTheirLength) {
 
 TEST(Sidecar, CanBeStopped) {
   const std::filesystem::path file = HAPTICD_TESTDATA "/recordings/all_commands_law2.haptics";
-  EXPECT_NE(sidecarOf(file), "");
+  EXPECT_NE(sidecarOf(file).json, "");
   struct Stopped {};
   EXPECT_THROW(sidecarOf(file, [] { throw Stopped(); }), Stopped);
 }

@@ -2,8 +2,12 @@
 #include "tls/tls.h"
 
 #include <gtest/gtest.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -54,7 +58,7 @@ class TlsTest : public ::testing::Test {
   }
 
   net::Loop loop_;
-  const Context context_ = Context::serverWithNewKey();
+  Context context_ = Context::serverWithNewKey();
   std::optional<net::TcpListener> listener_;
   Side server_;
   Side client_;
@@ -95,6 +99,53 @@ TEST_F(TlsTest, AnotherCertificateEndsTheConnectionBeforeAnythingIsSent) {
             std::string::npos)
       << *client_.ended;
   EXPECT_EQ(server_.received, "");
+}
+
+// Signed by itself for the host lab7, valid from and until these seconds from now. Returns its file; the key
+// is beside it.
+fs::path certificateFor(long from_s, long until_s) {
+  const fs::path file = fs::path(testing::TempDir()) / ("lab7-" + std::to_string(getpid()) + ".pem");
+  EVP_PKEY* const key = EVP_EC_gen("P-256");
+  X509* const certificate = X509_new();
+  X509_gmtime_adj(X509_getm_notBefore(certificate), from_s);
+  X509_gmtime_adj(X509_getm_notAfter(certificate), until_s);
+  const auto* const name = reinterpret_cast<const unsigned char*>("lab7");
+  X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate), "CN", MBSTRING_ASC, name, -1, -1, 0);
+  X509_set_issuer_name(certificate, X509_get_subject_name(certificate));
+  X509_set_pubkey(certificate, key);
+  X509_sign(certificate, key, EVP_sha256());
+  std::FILE* out = std::fopen(file.c_str(), "w");
+  PEM_write_X509(out, certificate);
+  std::fclose(out);
+  out = std::fopen((file.string() + ".key").c_str(), "w");
+  PEM_write_PrivateKey(out, key, nullptr, nullptr, 0, nullptr, nullptr);
+  std::fclose(out);
+  fs::permissions(file.string() + ".key", fs::perms::owner_read | fs::perms::owner_write);
+  X509_free(certificate);
+  EVP_PKEY_free(key);
+  return file;
+}
+
+TEST_F(TlsTest, ACertificateThatIsRefusedIsSaidToBeWrongInWhat) {
+  constexpr long kDay_s = 86'400;
+  const auto endOf = [&](long from_s, long until_s, const std::string& host) {
+    const fs::path file = certificateFor(from_s, until_s);
+    context_ = Context::server(file, file.string() + ".key");
+    client_ = {};
+    server_ = {};
+    connect(Context::clientThatTrusts(file, host));
+    client_.send("hello");
+    EXPECT_TRUE(until([&] { return client_.ended || server_.received == "hello"; }));
+    fs::remove(file);
+    fs::remove(file.string() + ".key");
+    return client_.ended.value_or("");
+  };
+  const std::string failed = "TLS handshake failed: certificate verify failed: ";
+  const std::string clock = ", or the clock of this machine is wrong";
+  EXPECT_EQ(endOf(-kDay_s, kDay_s, "lab7"), "");
+  EXPECT_EQ(endOf(-2 * kDay_s, -kDay_s, "lab7"), failed + "certificate has expired" + clock);
+  EXPECT_EQ(endOf(kDay_s, 2 * kDay_s, "lab7"), failed + "certificate is not yet valid" + clock);
+  EXPECT_EQ(endOf(-kDay_s, kDay_s, "lab8"), failed + "hostname mismatch");
 }
 
 TEST_F(TlsTest, AClientWithoutTlsIsRefused) {

@@ -124,6 +124,16 @@ void requestMemory(const ThreadRequest& request, SetupAnswer& answer) {
   if (!answer.granted) answer.remedy = "free some memory, or run outside the container that limits it";
 }
 
+// Of the calling thread; that of the main thread is the limit of the system.
+std::size_t stackSize() noexcept {
+  std::size_t size = 2 * kStack_bytes;
+  pthread_attr_t attributes;
+  if (pthread_getattr_np(pthread_self(), &attributes) != 0) return size;
+  pthread_attr_getstacksize(&attributes, &size);
+  pthread_attr_destroy(&attributes);
+  return size;
+}
+
 [[gnu::noinline]] void touchStack() {
   std::byte pages[kStack_bytes];
   volatile std::byte* page = pages;
@@ -194,6 +204,9 @@ ThreadSetup setUpThread(const ThreadRequest& request) {
   prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may delay a wake-up by 50 µs
   if (request.keepScheduling) {
     setup.stack.text = "the stack of the vendor library";
+  } else if (const std::size_t stack = stackSize(); stack < kStack_bytes + kStack_bytes / 4) {
+    setup.stack = {"stack", true, false, "only " + std::to_string(stack / 1024) + " kB of stack",
+                   "set the limit of stacks by 'ulimit -s 8192'"};
   } else {
     touchStack();
     setup.stack = {"stack", true, true, std::to_string(kStack_bytes / 1024) + " kB of stack are in memory",

@@ -311,6 +311,9 @@ void checkLimits(const Checker& check, const LimitsConfig& limits) {
 }
 
 void checkRecord(const Checker& check, const std::string& file) {
+  if (file == "-")
+    check.fail("record",
+               "record: '-' would be a file of that name; the log is on standard output: name a file");
   const std::string extension = std::filesystem::path(file).extension();
   for (const char* to : {"mcap", "csv", "vrpn"}) {
     if (extension != std::string(".") + to) continue;

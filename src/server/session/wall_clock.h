@@ -1,7 +1,7 @@
 // Wall time of time stamps on the wire.
 #pragma once
 
-#include "base/world.h"
+#include "base/wall_offset.h"
 #include "wire/types.h"
 
 namespace hapticd::server {
@@ -10,12 +10,10 @@ namespace hapticd::server {
 /// wall clock was set), so that the stamps of neighbouring ticks keep their true distance.
 class WallClock {
  public:
-  WallClock() : offset_(measure()) {}
-
   /// Detects that the wall clock was set; call it periodically.
   void refresh() noexcept {
-    const base::Nanos fresh = measure();
-    if (fresh - offset_ > 1000000 || offset_ - fresh > 1000000) offset_ = fresh;
+    const std::optional<base::Nanos> fresh = base::tryWallOffset();
+    if (fresh && (*fresh - offset_ > base::kWallStep || offset_ - *fresh > base::kWallStep)) offset_ = *fresh;
   }
   wire::Time at(base::Nanos monotonic) const noexcept {
     const base::Nanos wall = monotonic + offset_;
@@ -27,9 +25,7 @@ class WallClock {
   wire::Time now() const noexcept { return at(base::now()); }
 
  private:
-  static base::Nanos measure() noexcept { return base::wallNow() - base::now(); }
-
-  base::Nanos offset_;
+  base::Nanos offset_ = base::wallOffset();
 };
 
 }  // namespace hapticd::server

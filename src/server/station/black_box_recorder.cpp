@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <ctime>
+#include <system_error>
 
+#include "base/wall_offset.h"
 #include "base/world.h"
 #include "record/export.h"
 
@@ -80,7 +82,7 @@ void deleteEmpty(const fs::path& file) {
 }  // namespace
 
 void writeBlackBox(const fs::path& file, const std::string& device, const std::vector<TickReport>& ticks) {
-  const base::Nanos wallOffset = base::wallNow() - base::now();
+  const base::Nanos wallOffset = base::wallOffset();
   record::CsvFile out(file);
   for (const TickReport& tick : ticks) out.add(record::sampleOf(device, tick, wallOffset));
   out.close();
@@ -112,22 +114,27 @@ void BlackBoxRecorder::poll() {
   spdlog::warn("device '{}': forces are off: {}; writing the last {} ticks to {}", name_, fault, ticks.size(),
                file.string());
   writes_.store(true, std::memory_order_release);
-  writer_ = base::Thread(
-      {.name = "black box"}, [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
-        const std::vector<TickReport> box = std::exchange(ticks, {});
-        if (box.empty()) return std::nullopt;  // written already
-        try {
-          base::world().files.createFolder(file.parent_path());
-          writeBlackBox(file, name_, box);
-          deleteOldest(file, files_.keep, files_.bytes);
-        } catch (const std::exception& error) {
-          spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
-                        error.what());
-          deleteEmpty(file);
-        }
-        writes_.store(false, std::memory_order_release);
-        return std::nullopt;
-      });
+  auto write = [this, file, ticks = std::move(ticks)]() mutable -> std::optional<base::Nanos> {
+    const std::vector<TickReport> box = std::exchange(ticks, {});
+    if (box.empty()) return std::nullopt;  // written already
+    try {
+      base::world().files.createFolder(file.parent_path());
+      writeBlackBox(file, name_, box);
+      deleteOldest(file, files_.keep, files_.bytes);
+    } catch (const std::exception& error) {
+      spdlog::error("device '{}': {}; set black_box_dir to a directory that can be written", name_,
+                    error.what());
+      deleteEmpty(file);
+    }
+    writes_.store(false, std::memory_order_release);
+    return std::nullopt;
+  };
+  try {
+    writer_ = base::Thread({.name = "black box"}, std::move(write));
+  } catch (const std::system_error& error) {
+    writes_.store(false, std::memory_order_release);  // the next one may be written
+    spdlog::error("device '{}': {} is not written: {}", name_, file.string(), error.what());
+  }
 }
 
 void BlackBoxRecorder::finish() {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sched.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -226,6 +227,25 @@ bool sliceCanBeChosen() {
   SchedulingAttributes wanted = attributesOfThisThread();
   wanted[3] = kSlice_ns;
   return syscall(SYS_sched_setattr, 0, wanted.data(), 0U) == 0 && attributesOfThisThread()[3] == kSlice_ns;
+}
+
+TEST(ThreadSetup, AStackThatIsTooSmallIsAComplaintAndNoCrash) {
+  pthread_attr_t small;
+  pthread_attr_init(&small);
+  ASSERT_EQ(pthread_attr_setstacksize(&small, 256 * 1024), 0);
+  ThreadSetup setup;
+  const auto body = [](void* result) -> void* {
+    *static_cast<ThreadSetup*>(result) = setUpThread({.realtime = false, .lockMemory = false});
+    return nullptr;
+  };
+  pthread_t thread{};
+  ASSERT_EQ(pthread_create(&thread, &small, body, &setup), 0);
+  pthread_join(thread, nullptr);
+  pthread_attr_destroy(&small);
+  EXPECT_TRUE(setup.stack.asked);
+  EXPECT_FALSE(setup.stack.granted);
+  EXPECT_NE(setup.complaints().find("stack: only 256 kB of stack"), std::string::npos) << setup.complaints();
+  EXPECT_NE(setup.complaints().find("ulimit -s 8192"), std::string::npos);
 }
 
 TEST(ThreadSetup, AShortSliceChangesNeitherPolicyNorNiceness) {

@@ -1,12 +1,16 @@
 // Small parts between clients and a device: buttons, roles, steering the hand, stop and re-arm, black boxes.
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <sstream>
 #include <string_view>
+#include <system_error>
 #include <thread>
+#include <utility>
 
 #include "base/fake_world.h"
 #include "base/time.h"
@@ -555,6 +559,42 @@ TEST_F(BlackBoxFilesTest, ADiskThatHangsHoldsNobodyUp) {
   recorder.finish();
   EXPECT_FALSE(box.frozen());
   EXPECT_EQ(files().size(), 2U);
+}
+
+// As of a machine that is out of threads or memory, for the next one that starts.
+class RefusingThreads final : public base::Threads {
+ public:
+  std::unique_ptr<base::Thread::Impl> start(base::ThreadOptions options, base::Step step) override {
+    if (std::exchange(refuses_, false)) throw std::system_error(EAGAIN, std::generic_category());
+    return system_.start(std::move(options), std::move(step));
+  }
+  std::unique_ptr<base::BlockingThread::Impl> startBlocking(base::ThreadOptions options,
+                                                            std::function<void()> body) override {
+    return system_.startBlocking(std::move(options), std::move(body));
+  }
+  std::unique_ptr<base::PacedThread::Impl> startPaced(base::ThreadOptions options, base::Clock& clock,
+                                                      base::Step step) override {
+    return system_.startPaced(std::move(options), clock, std::move(step));
+  }
+
+ private:
+  base::SystemThreads system_;
+  bool refuses_ = true;
+};
+
+TEST_F(BlackBoxFilesTest, AMachineOutOfThreadsLosesOneOnly) {
+  RefusingThreads threads;
+  const base::World& world = base::world();
+  const base::ScopedWorld scoped({world.clock, threads, world.files, world.random});
+  realtime::BlackBox box(5);
+  BlackBoxRecorder recorder("Phantom/1", {directory_, 3}, box);
+  for (int fault = 0; fault < 2; ++fault) {
+    fail(box, 2);
+    EXPECT_NO_THROW(recorder.poll());
+  }
+  recorder.finish();
+  EXPECT_FALSE(box.frozen());
+  EXPECT_EQ(files().size(), 1U);
 }
 
 std::string_view effectOn(TripAction action) {
