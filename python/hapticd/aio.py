@@ -27,6 +27,7 @@ from . import _messages as m
 from . import reports as r
 from ._address import local_towards, parse, resolve
 from ._codec import Numbers
+from ._commands import function
 from ._core import (
     BATCH_BYTES,
     CLOSED_BY_SERVER,
@@ -575,6 +576,8 @@ class Client(Core):
         triangles: "Optional[npt.NDArray[Any]]",
         progress: Optional[Callable[[UploadProgress], object]],
     ) -> None:
+        if progress is not None:
+            function(progress, "a function that takes one hapticd.UploadProgress")
         await self._wait_answer()
         frames, messages = self._mesh_frames(object, vertices, triangles)
         if self._held is not None:
