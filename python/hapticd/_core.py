@@ -8,7 +8,7 @@ import time
 import weakref
 from collections import deque
 from dataclasses import dataclass
-from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, NoReturn, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -299,6 +299,8 @@ if hasattr(os, "register_at_fork"):
 class Core(Commands):
     """Commands in, bytes out; bytes in, callbacks and latest reports out."""
 
+    _ELSEWHERE = ""  # what a call from another place is told
+
     def __init__(self, address: Address, options: Options) -> None:
         self.options = options
         #: NAME of the device.
@@ -536,11 +538,16 @@ class Core(Commands):
         self._call(name, report)
 
     def _call(self, name: str, report: Any) -> None:
-        callbacks = self._callbacks[name]
-        if callbacks:
-            for subscription in tuple(callbacks):
-                if subscription.active:
+        """One that raises does not keep the report from the others. Raises what the first one raised."""
+        failure: Optional[Exception] = None
+        for subscription in tuple(self._callbacks[name]):
+            if subscription.active:
+                try:
                     subscription.callback(report)
+                except Exception as error:
+                    failure = failure or error
+        if failure is not None:
+            raise failure
 
     def _raise_first_error(self) -> None:
         if self.options.throw_on_error and self._first_error:
@@ -555,6 +562,7 @@ class Core(Commands):
 
     def _send(self, message: Any, fast: bool = False) -> None:
         if fast and self._held is None and self.connected:
+            self._check_place()
             assert self._peer is not None
             one = self._frame(message)
             self._peer.send_fast(one)
@@ -597,14 +605,27 @@ class Core(Commands):
     def _put_now(self, message: Any) -> bool:
         """Appends a message ahead of a batch that is held; false without a connection. The face sends it. Raises
         ConnectionLost after close()."""
+        self._check_open()
         if not self.connected:
-            self._check_open()
             self._counts.messages_dropped += 1
             return False
         assert self._peer is not None
         self._peer.send_frames(self._frame(message))
         self._counts.messages_out += 1
         return True
+
+    def _is_used_elsewhere(self) -> bool:
+        """Whether this call comes from another place than the one that uses the client at present."""
+        raise NotImplementedError
+
+    def _check_place(self) -> None:
+        """Raises RuntimeError for a call that would mix its bytes with those of another thread."""
+        if self._is_used_elsewhere():
+            raise RuntimeError(f"this client of {self.device}@{self.server} {self._ELSEWHERE}")
+
+    def __reduce_ex__(self, _: Any) -> NoReturn:
+        """A copy would close the sockets of the first when it ends."""
+        raise TypeError(f"a client of {self.device}@{self.server} cannot be copied or pickled: connect where it is used")
 
     @property
     def connected(self) -> bool:
@@ -613,9 +634,10 @@ class Core(Commands):
         return self._peer is not None and self._peer.connected
 
     def _check_open(self) -> None:
-        """Raises ConnectionLost after close()."""
+        """Raises ConnectionLost after close(), and RuntimeError while another thread uses the client."""
         if self._finished:
             raise ConnectionLost(f"this client of {self.device}@{self.server} {self._over}")
+        self._check_place()
 
     def _check_renewed(self) -> None:
         """Raises ConnectionLost when the connection has ended and no other will follow."""

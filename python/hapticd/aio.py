@@ -230,6 +230,11 @@ class Client(Core):
     """One device of one server; see hapticd.Client for everything that both faces share. It belongs to one event
     loop. Made by connect()."""
 
+    _ELSEWHERE = (
+        "belongs to another event loop, or to the thread of one: asyncio.run_coroutine_threadsafe() or "
+        "loop.call_soon_threadsafe() hands it a call"
+    )
+
     def __init__(self, device: str, options: Options = Options()) -> None:
         super().__init__(parse(device), options)
         self._loop = asyncio.get_running_loop()
@@ -249,6 +254,10 @@ class Client(Core):
         self._soon: Optional[asyncio.Handle] = None
         self._adopted: Optional["asyncio.Future[None]"] = None
         self._task: Optional["asyncio.Task[None]"] = None
+
+    def _is_used_elsewhere(self) -> bool:
+        running = asyncio._get_running_loop()
+        return running is not self._loop and (running is not None or self._loop.is_running() or self._loop.is_closed())
 
     async def _start(self) -> None:
         self._target = await self._loop.run_in_executor(None, resolve, self._address)
@@ -525,6 +534,7 @@ class Client(Core):
 
     def flush(self) -> None:
         """Gives what is collected to the event loop now."""
+        self._check_place()
         self._push()
 
     async def flush_all(self) -> None:

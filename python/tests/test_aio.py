@@ -332,6 +332,40 @@ def test_an_exception_of_a_callback_goes_to_the_loop(server: Server) -> None:
     run(main())
 
 
+def test_a_callback_that_raises_does_not_keep_reports_from_what_waits(server: Server, caplog: pytest.LogCaptureFixture) -> None:
+    async def run() -> int:
+        async with hapticd.aio.connect(server.tcp) as hand:
+            hand.on_text(lambda report: 1 / 0)
+            hand.set_transform(0, np.zeros((4, 4)))  # refused by a text
+            async for report in hand.reports("text", seconds=60):
+                return int(report.severity)
+            return -1
+
+    assert asyncio.run(run()) == hapticd.Severity.ERROR
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_call_of_another_loop_or_thread_is_refused(server: Server) -> None:
+    async def call_by_a_thread() -> hapticd.aio.Client:
+        hand = await hapticd.aio.connect(server.tcp)
+        sent = hand.statistics().messages_out
+        for call in (lambda: hand.clear_mesh(0), hand.flush, lambda: hand.set_force_field(hapticd.ForceField())):
+            with pytest.raises(RuntimeError, match="belongs to another event loop, or to the thread of one"):
+                await asyncio.get_running_loop().run_in_executor(None, call)
+        assert hand.statistics().messages_out == sent
+        hand.clear_mesh(0)
+        await hand.flush_all()
+        return hand
+
+    async def use(hand: hapticd.aio.Client) -> None:
+        for wait in (lambda: hand.poll(60), hand.stop_forces, lambda: hand.mark("x"), lambda: hand.collect("force", 60)):
+            with pytest.raises(RuntimeError, match="belongs to another event loop"):
+                await wait()  # type: ignore[no-untyped-call]
+
+    hand = asyncio.run(call_by_a_thread())
+    asyncio.run(use(hand))
+
+
 def test_a_stop_passes_a_large_upload(server: Server) -> None:
     async def main() -> None:
         vertices, triangles = hapticd.sphere(25, rings=300)

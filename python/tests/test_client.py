@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+import copy
 import gc
 import os
 import pathlib
+import pickle
 import select
 import shutil
 import signal
@@ -658,6 +660,98 @@ def test_a_poll_in_a_callback_does_not_keep_the_outer_poll() -> None:
         until(hand, lambda: len(seen) == many)
         assert seen == list(range(1, many + 1))
     scripted.close()
+
+
+def test_one_callback_that_raises_does_not_keep_a_report_from_the_others(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        heard: List[Any] = []
+
+        def first(report: Any) -> None:
+            raise KeyError("of the first")
+
+        def last(report: Any) -> None:
+            raise KeyError("of the last")
+
+        hand.on_text(first)
+        hand.on_text(heard.append)
+        hand.on_text(last)
+        hand.set_transform(0, np.zeros((4, 4)))  # refused by a text
+        deadline = time.monotonic() + 60
+        with pytest.raises(KeyError, match="of the first"):
+            while time.monotonic() < deadline:
+                hand.poll(1)
+        assert [report.severity for report in heard] == [hapticd.Severity.ERROR]
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_call_while_another_thread_polls_is_refused_but_a_stop_acts(server: Server, way: str) -> None:
+    """Two threads would mix their bytes in one stream, and the server would end it."""
+    with hapticd.connect(getattr(server, way)) as hand, hapticd.connect(server.tcp) as other:
+        hand.wait_capabilities()
+        asleep, awake = threading.Event(), threading.Event()
+        select = hand._select
+
+        def sleep(timeout: float) -> Any:
+            asleep.set()
+            awake.wait(60)
+            return select(0.0)
+
+        hand._select = sleep  # type: ignore[method-assign,assignment]
+        worker = threading.Thread(target=hand.poll)
+        worker.start()
+        try:
+            assert asleep.wait(60)
+            sent = hand.statistics().messages_out
+            calls: Dict[str, Any] = {**COMMANDS, **WAITS, "flush": ()}
+            for call in sorted(set(calls) - {"stop_forces", "wait_capabilities"}):
+                with pytest.raises(RuntimeError, match="in use by another thread: connect one client for each thread"):
+                    getattr(hand, call)(*calls[call])
+            with pytest.raises(RuntimeError, match="in use by another thread"):
+                with hand.batch():
+                    hand.clear_mesh(0)
+            assert hand.statistics().messages_out == sent
+            hand.stop_forces()
+            deadline = time.monotonic() + 60
+            while not other.latest.guard.stopped and time.monotonic() < deadline:
+                other.poll(0.1)
+            assert other.latest.guard.stopped
+        finally:
+            awake.set()
+            worker.join(60)
+            hand._select = select  # type: ignore[method-assign]
+        hand.rearm_forces()
+        assert hand.statistics().connections == 1
+
+
+def test_another_thread_may_close_a_client_that_waits(server: Server) -> None:
+    hand = hapticd.connect(server.tcp)
+    ends: List[BaseException] = []
+
+    def work() -> None:
+        try:
+            hand.run_for(3600)
+        except BaseException as end:
+            ends.append(end)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    while not hand._inside and worker.is_alive():
+        time.sleep(0.001)
+    hand.close()
+    worker.join(60)
+    assert [type(end) for end in ends] == [hapticd.ConnectionLost]
+
+
+def test_a_client_is_not_copied(server: Server) -> None:
+    """The copy would close the sockets of the first when it ends."""
+    with hapticd.connect(server.tcp) as hand:
+        for attempt in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match="cannot be copied or pickled: connect where it is used"):
+                attempt(hand)
+        hand.run_for(0.01)
+        assert hand.connected
+        report = hand.latest.guard
+        assert pickle.loads(pickle.dumps(report)) == copy.deepcopy(report) == report
 
 
 def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
