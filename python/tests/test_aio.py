@@ -511,8 +511,10 @@ def test_errors() -> None:
             await hand.upload_mesh(0, np.eye(3), [[0, 1, 2]])
         scripted.close()
         wrong = ScriptedServer(device="Tracker0")
-        with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
-            await hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0.3)
+        async with hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0) as nobody:
+            await until(nobody, lambda: nobody._server_devices)
+            with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
+                await nobody.wait_connected(0.3)
         wrong.close()
 
     run(main())

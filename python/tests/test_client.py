@@ -479,8 +479,10 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         hapticd.connect("Phantom@http://localhost:3883")
     with pytest.raises(ValueError, match="port '99999', expected 1 to 65535"):
         hapticd.connect("Phantom@localhost:99999")
-    with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
-        hapticd.connect(server.tcp.replace("Phantom", "Nobody"), connect_timeout=0.3)
+    with hapticd.connect(server.tcp.replace("Phantom", "Nobody"), connect_timeout=0) as nobody:
+        until(nobody, lambda: nobody._server_devices)
+        with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
+            nobody.wait_connected(0.3)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1"):
