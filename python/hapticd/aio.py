@@ -13,6 +13,7 @@ program that sends much awaits flush_all() from time to time. What must wait for
 
 import asyncio
 import os
+import socket
 import time
 import weakref
 from collections import deque
@@ -127,7 +128,7 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
         if lost is not None:
             await lost.wait()
         client = reference()
-        if client is None or (client._counts.connections and not client.options.reconnect):
+        if client is None or client._finished or (client._counts.connections and not client.options.reconnect):
             return
         del client
         await asyncio.sleep(RETRY_S)
@@ -273,12 +274,20 @@ class Client(Core):
         """Sends what is collected, waits until the server has read it, and closes all sockets, as
         hapticd.Client.close(); cancelled, it closes them at once. An `async with` block that is cancelled, as by Ctrl-C, waits
         no longer than 1 s. From its first step on every command, and everything that waits, raises ConnectionLost; `latest`
-        is empty. Does nothing the second time. A client whose last name is gone closes, too, as hapticd.Client, as long as
+        is empty. Does nothing the second time. In another event loop than the client's it ends the connection without waiting.
+        A client whose last name is gone closes, too, as hapticd.Client, as long as
         the event loop runs."""
         await self._close(float("inf"))
 
     async def _close(self, longest: float) -> None:
         if self._finished:
+            return
+        if self._is_used_elsewhere():
+            self._finished = True
+            sock = self._transport.get_extra_info("socket") if self._transport is not None else None
+            if sock is not None:
+                with suppress(OSError):  # it has ended already
+                    sock.shutdown(socket.SHUT_RDWR)
             return
         if self.connected:
             self._push()

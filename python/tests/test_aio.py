@@ -364,6 +364,26 @@ def test_a_call_of_another_loop_or_thread_is_refused(server: Server) -> None:
 
     hand = asyncio.run(call_by_a_thread())
     asyncio.run(use(hand))
+    ends = [line for line in server.log if "disconnected" in line]
+    asyncio.run(hand.close())  # its own loop has ended
+    assert hand._finished
+    deadline = time.monotonic() + 60
+    while [line for line in server.log if "disconnected" in line] == ends:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_another_thread_may_close_a_client(server: Server) -> None:
+    async def run() -> None:
+        hand = await hapticd.aio.connect(server.tcp)
+        await asyncio.get_running_loop().run_in_executor(None, lambda: asyncio.run(hand.close()))
+        with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+            await hand.poll(60)
+        assert hand._task is not None
+        await asyncio.wait_for(hand._task, 60)
+        assert not hand.connected
+
+    asyncio.run(run())
 
 
 def test_a_stop_passes_a_large_upload(server: Server) -> None:
