@@ -146,6 +146,7 @@ class Client(Core):
     def __init__(self, device: str, options: Options = Options()) -> None:
         address = parse(device)
         self._inside = 0  # the thread that moves bytes or sleeps
+        self._pushing = False
         super().__init__(address, options)
         self._target = resolve(address)
         self._selector = selectors.DefaultSelector()
@@ -402,17 +403,29 @@ class Client(Core):
                     self._out[0] = self._out[0][sent:]
 
     def _push(self) -> None:
-        """Gives collected bytes to the system, as far as it accepts them without waiting."""
+        """Gives collected bytes to the system, as far as it accepts them without waiting. What a signal handler collects
+        meanwhile goes with them."""
+        if not self._pushing:
+            self._pushing = True
+            try:
+                self._push_now()
+            finally:
+                self._pushing = False
+
+    def _push_now(self) -> None:
         peer, sock = self._peer, self._sock
         if peer is None or sock is None or self._connecting:
             return
         self._uncounted = 0
         try:
-            if peer.stream:
-                data = memoryview(peer.take_stream())
-                self._out.append(data)
-                self._out_bytes += len(data)
-            self._write(sock)
+            while True:
+                if peer.stream:
+                    data = memoryview(peer.take_stream())
+                    self._out.append(data)
+                    self._out_bytes += len(data)
+                self._write(sock)
+                if not peer.stream:
+                    break
         except OSError as error:
             return self._fail(str(error))
         except BaseException:
@@ -717,12 +730,12 @@ class Client(Core):
         sends the stop there and waits for the server's confirmation. Heartbeats continue meanwhile. Raises
         ConnectionLost without a connection, also when the server has ended it and nothing has been polled since
         (where the system says so: on Linux), and ConnectError when the second connection is not confirmed within
-        Options.connect_timeout (at least 1 s). May be called from any thread: while another one uses the client, only the second
-        connection is used."""
-        if self._is_used_elsewhere():
+        Options.connect_timeout (at least 1 s). May be called from any thread, and by a signal handler: while the client is in
+        use, only the second connection is used."""
+        if self._pushing or self._is_used_elsewhere():
             if self._answered:
                 self._require_now(m.FEATURE_STOP, "stop the forces")
-            return self._stop_beside("another thread uses this connection", heartbeats=False)
+            return self._stop_beside("this connection is in use", heartbeats=False)
         backlog = self._out_bytes + (self._peer.stream_bytes if self._peer is not None else 0)
         if self._sock is not None and not self._connecting:
             backlog += unacknowledged(self._sock)

@@ -725,6 +725,43 @@ def test_a_call_while_another_thread_polls_is_refused_but_a_stop_acts(server: Se
         assert hand.statistics().connections == 1
 
 
+class Interrupted:
+    """A socket during whose first send() a signal arrives."""
+
+    def __init__(self, sock: Any, handler: Callable[[], None]) -> None:
+        self._sock = sock
+        self._handlers = [handler]
+
+    def send(self, data: Any) -> int:
+        sent = int(self._sock.send(data))
+        while self._handlers:
+            self._handlers.pop()()
+        return sent
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._sock, name)
+
+
+def test_a_signal_handler_may_stop_the_forces_while_bytes_are_written(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand, hapticd.connect(server.tcp) as other:
+        hand.wait_capabilities()
+        assert not other.latest.guard.stopped
+
+        def handler() -> None:
+            hand.mark("in a handler")
+            hand.stop_forces()
+
+        hand._sock = Interrupted(hand._sock, handler)  # type: ignore[assignment]
+        texts: List[str] = []
+        hand.on_text(lambda report: texts.append(report.text))
+        hand.upload_mesh(0, *hapticd.sphere(25))
+        until(other, lambda: other.latest.guard.stopped)
+        until(hand, lambda: "marked for all clients; this server records nothing" in texts)
+        assert hand.statistics().connections == 1
+        hand.rearm_forces()
+        hand._sock = hand._sock._sock  # type: ignore[attr-defined]
+
+
 def test_another_thread_may_close_a_client_that_waits(server: Server) -> None:
     hand = hapticd.connect(server.tcp)
     ends: List[BaseException] = []
