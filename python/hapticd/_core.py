@@ -214,15 +214,15 @@ def as_vertices(vertices: "npt.ArrayLike") -> "npt.NDArray[Any]":
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"vertices of shape {array.shape}: give (n, 3)")
     with np.errstate(over="ignore", invalid="ignore"):
-        rows = np.ascontiguousarray(array, dtype=">f4")
-    finite = np.isfinite(rows).all(axis=1)
+        rows = np.ascontiguousarray(array, dtype=np.float32)
+    finite = np.isfinite(rows)
     if not finite.all():
-        wrong = int(np.argmin(finite))
+        wrong = int(np.argmin(finite.all(axis=1)))
         raise ValueError(
             f"vertex {wrong} is {shortened(array[wrong].tolist())}: give finite numbers, at most 3.4e38, or leave it out with its "
             "triangles"
         )
-    return rows
+    return rows.astype(">f4")
 
 
 def as_corners(corners: "npt.ArrayLike") -> "npt.NDArray[Any]":
