@@ -312,8 +312,10 @@ class Ticks:
         column. Needs pandas."""
         import pandas  # type: ignore[import]
 
+        if columns is None:
+            columns = ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons")
         table: Dict[str, Any] = {}
-        for name in _names(columns or ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons")):
+        for name in _names(columns):
             array = self[name]
             if array.ndim == 1:
                 table[name] = array

@@ -316,6 +316,13 @@ def test_a_device_that_is_no_text_is_refused(device: Any) -> None:
         hapticd.connect(device)
 
 
+def test_a_name_that_no_device_can_have_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^device 'ÄÄÄ.*: a name of 96 bytes, at most 95$"):
+        hapticd.connect("Ä" * 48 + "@localhost")
+    with pytest.raises(ValueError, match=r"^device 'Phan.udcfctom': give a text without surrogates"):
+        hapticd.connect("Phan\udcfctom@localhost")
+
+
 def test_a_host_that_cannot_be_is_an_unknown_host() -> None:
     with pytest.raises(hapticd.ConnectError, match="no server at .:3883"):
         hapticd.connect("Phantom@tcp://.")
