@@ -19,7 +19,9 @@ import weakref
 from collections import deque
 from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
-from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple, Type
+from typing import (
+    TYPE_CHECKING, Any, AsyncIterator, Callable, Deque, Generator, List, NoReturn, Optional, Sequence, Set, Tuple, Type,
+)  # fmt: skip
 
 import numpy as np
 import numpy.typing as npt
@@ -805,6 +807,11 @@ class _Connecting:
 
     def __await__(self) -> Generator[Any, None, Client]:
         return self._open().__await__()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise AttributeError(f"{name}: connect() gives the client to 'await connect(...)' or 'async with connect(...) as hand'")
 
     async def __aenter__(self) -> Client:
         self._client = await self._open()

@@ -373,6 +373,12 @@ def test_a_call_of_another_loop_or_thread_is_refused(server: Server) -> None:
         time.sleep(0.005)
 
 
+def test_a_connection_that_is_not_awaited_says_so() -> None:
+    with pytest.raises(AttributeError, match=r"^set_surface: connect\(\) gives the client to 'await connect"):
+        hapticd.aio.connect("Phantom@localhost").set_surface(0, Surface())  # type: ignore[attr-defined]
+    assert not hasattr(hapticd.aio.connect("Phantom@localhost"), "__enter__")
+
+
 def test_another_thread_may_close_a_client(server: Server) -> None:
     async def run() -> None:
         hand = await hapticd.aio.connect(server.tcp)
