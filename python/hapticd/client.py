@@ -406,8 +406,8 @@ class Client(Core):
         """Gives collected bytes to the system, as far as it accepts them without waiting. What a signal handler collects
         meanwhile goes with them."""
         if not self._pushing:
-            self._pushing = True
-            try:
+            try:  # also for a Ctrl-C between this line and the next
+                self._pushing = True
                 self._push_now()
             finally:
                 self._pushing = False

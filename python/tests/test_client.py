@@ -721,8 +721,14 @@ def test_a_call_while_another_thread_polls_is_refused_but_a_stop_acts(server: Se
             awake.set()
             worker.join(60)
             hand._select = select  # type: ignore[method-assign]
-        hand.rearm_forces()
+        rearm(hand, other)
         assert hand.statistics().connections == 1
+
+
+def rearm(hand: hapticd.Client, other: hapticd.Client) -> None:
+    """Ends a stop that the other one has seen. A re-arm acts only while its client is there."""
+    hand.rearm_forces()
+    until(other, lambda: not other.latest.guard.stopped)
 
 
 class Interrupted:
@@ -758,8 +764,8 @@ def test_a_signal_handler_may_stop_the_forces_while_bytes_are_written(server: Se
         until(other, lambda: other.latest.guard.stopped)
         until(hand, lambda: "marked for all clients; this server records nothing" in texts)
         assert hand.statistics().connections == 1
-        hand.rearm_forces()
         hand._sock = hand._sock._sock  # type: ignore[attr-defined]
+        rearm(hand, other)
 
 
 def test_another_thread_may_close_a_client_that_waits(server: Server) -> None:
