@@ -727,8 +727,8 @@ class Client(Core):
                 )
 
     async def rearm_forces(self) -> None:
-        """Ends a stop and clears latched trips; the force ramps in over half a second. Raises as
-        hapticd.Client.rearm_forces()."""
+        """Ends a stop and clears latched trips; the force ramps in over half a second. Acts only while its client is there, and
+        raises, as hapticd.Client.rearm_forces()."""
         await self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_key()
         self._send_at_once(m.RearmForces(), "forces not re-armed")

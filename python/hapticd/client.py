@@ -788,7 +788,8 @@ class Client(Core):
 
     def rearm_forces(self) -> None:
         """Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind the
-        commands sent before it, and never undoes a stop that is sent after it. Waits for a connection up to
+        commands sent before it, and never undoes a stop that is sent after it. It acts only while its client is there: a program that
+        ends waits until a GuardReport says that the device is not stopped any more, or the stop stands. Waits for a connection up to
         Options.connect_timeout (ConnectError); raises ConnectionLost when the connection turns out to have ended."""
         self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_key()

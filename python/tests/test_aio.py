@@ -74,6 +74,7 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
             await hand.stop_forces()
             await until(hand, lambda: hand.latest.guard.stopped)
             await hand.rearm_forces()
+            await until(hand, lambda: not hand.latest.guard.stopped)
             await hand.release_hand()
             assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
 
