@@ -446,8 +446,8 @@ class Client(Core):
     def _step(self, timeout: float) -> None:
         """Sends, sleeps up to the timeout until something arrives or is due, receives. Runs no callbacks."""
         self._check_open()
-        self._inside = threading.get_ident()
         try:
+            self._inside = threading.get_ident()
             self._move(timeout)
         finally:
             self._inside = 0
