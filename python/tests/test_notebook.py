@@ -61,7 +61,7 @@ def test_the_scene_of_the_document_leaves_the_forces_armed(server: Server, tmp_p
         assert done.returncode == 0, done.stderr
         for _ in range(600):
             other.poll(0.1)
-            if stops[-2:] == [True, False]:
+            if True in stops and not stops[-1]:  # a late tick is reported by further ones
                 return
     raise AssertionError(stops)
 
