@@ -797,7 +797,7 @@ class Client(Core):
 
     def mark(self, text: str) -> None:
         """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. Sent at once,
-        even inside batch(). Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
+        even inside batch(). An empty text marks the time alone. Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
         stop_forces()."""
         self._send_at_once(m.Marker(0, text), "not marked")
 
