@@ -4,7 +4,7 @@ import re
 import socket
 from typing import NamedTuple, Tuple
 
-from ._codec import shortened
+from ._codec import shortened, utf8
 from ._peer import DEFAULT_PORT, MAX_NAME_BYTES
 from .errors import ConnectError
 
@@ -31,8 +31,11 @@ def parse(text: str) -> Address:
     if not isinstance(text, str):
         raise ValueError(f"device {shortened(text)}: expected {form}")
     device, at, rest = text.partition("@")
-    if not at or not device or "\0" in device or len(device.encode()) > MAX_NAME_BYTES:
+    if not at or not device or "\0" in device:
         raise ValueError(f"device {text!r}: expected {form}")
+    size = len(utf8(device, "device"))
+    if size > MAX_NAME_BYTES:
+        raise ValueError(f"device {shortened(text)}: a name of {size} bytes, at most {MAX_NAME_BYTES}")
     if rest.startswith(("[", "tcp://[")) or rest.count("::"):
         raise ValueError(f"device {text!r}: IPv6 addresses are not supported; use a name or an IPv4 address")
     match = _FORM.fullmatch(rest)

@@ -1,6 +1,9 @@
 """Payloads of messages as values: the engine below the generated table of messages."""
 
+import math
 import struct
+from contextlib import suppress
+from numbers import Real
 from typing import Any, Dict, Generic, List, NamedTuple, Sequence, Tuple, Type, TypeVar, Union
 
 import numpy as np
@@ -99,31 +102,34 @@ class Layout(Generic[M]):
         items[-1] = struct.unpack_from(f">{int(number)}{self._list.letter}", payload, self._struct.size)
         return self._make(items)  # type: ignore[no-any-return]
 
-    def encode(self, message: M) -> bytes:
-        """The payload of a message. Raises ValueError for a value that does not fit its field."""
+    def encode(self, message: M, finite: bool = False) -> bytes:
+        """The payload of a message. Raises ValueError for a value that does not fit its field; `finite`: for a number that
+        is not finite, too, as no command has any."""
         try:
-            return self._encode(message)
+            return self._encode(message, finite)
         except (struct.error, OverflowError, TypeError) as error:
             wrong = next(filter(None, map(_misfit, message, self.fields)), str(error))
             raise ValueError(f"{self.name}: {wrong}") from error
 
-    def _encode(self, message: M) -> bytes:
+    def _encode(self, message: M, finite: bool) -> bytes:
         values: List[Any] = []
         tail = b""
         for value, field in zip(message, self.fields):
-            if field.form == "one":
-                values.append(value)
-            elif field.form == "array":
-                if len(value) != field.count:
-                    raise ValueError(f"{self.name}: {field.name} needs {field.count} numbers, got {len(value)}")
-                values.extend(value)
-            elif field.form == "list":
-                if len(value) > field.count:
-                    raise ValueError(f"{self.name}: {field.name} has {len(value)} values, at most {field.count}")
-                values.append(len(value))
-                tail = struct.pack(f">{len(value)}{field.letter}", *value)
-            else:
+            if field.form in ("name", "text"):
                 values.append(_text(value, field))
+                continue
+            numbers = (value,) if field.form == "one" else value
+            if field.form == "list":
+                if len(numbers) > field.count:
+                    raise ValueError(f"{self.name}: {field.name} has {len(numbers)} values, at most {field.count}")
+                values.append(len(numbers))
+                tail = struct.pack(f">{len(numbers)}{field.letter}", *numbers)
+            elif len(numbers) != field.count:
+                raise ValueError(f"{self.name}: {field.name} is {shortened(value)}, expected {field.count} numbers")
+            else:
+                values.extend(numbers)
+            if finite and field.letter in "fd" and not all(map(math.isfinite, numbers)):
+                raise OverflowError  # encode() says which
         return self._struct.pack(*values) + tail
 
 
@@ -138,11 +144,13 @@ def _misfit(value: Any, field: _Field) -> str:
     if field.form in ("name", "text"):
         return "" if isinstance(value, str) else f"{field.name} is {shortened(value)}, expected a text"
     expected = _EXPECTED.get(field.letter, "a number")
-    if field.form != "one" and not hasattr(value, "__len__"):
+    if field.form != "one" and not has_length(value):
         return f"{field.name} is {shortened(value)}, expected a list of numbers"
     for one in (value,) if field.form == "one" else value:
         try:
             struct.pack(">" + field.letter, one)
+            if field.letter in "fd" and not math.isfinite(one):
+                raise OverflowError
         except (struct.error, OverflowError, TypeError):
             return f"{field.name} {'is' if field.form == 'one' else 'has'} {shortened(one)}, expected {expected}"
     return ""
@@ -154,18 +162,43 @@ def _integer(bits: int, signed: bool) -> str:
 
 
 _EXPECTED = {letter: _integer(8 * struct.calcsize(">" + letter), letter.islower()) for letter in "BhiIqQ"}
+_EXPECTED.update(d="a finite number", f="a finite number, at most 3.4e38")
 
 
 def _text(value: str, field: _Field) -> bytes:
     if not isinstance(value, str):
         raise TypeError
-    encoded = value.encode("utf-8")
+    encoded = utf8(value, field.name)
     most = field.count - 1 if field.form == "text" else field.count
     if len(encoded) > most:
         raise ValueError(f"{field.name} {value!r} has {len(encoded)} bytes, at most {most}")
     if b"\0" in encoded:  # the receiver would take it for the end
         raise ValueError(f"{field.name} {value!r} has a NUL character")
     return encoded
+
+
+def utf8(text: str, what: str) -> bytes:
+    """A text as messages carry it. Raises ValueError for half a character, as in names of files that are no UTF-8."""
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{what} {shortened(text)}: give a text without surrogates, which UTF-8 cannot carry") from error
+
+
+def has_length(value: Any) -> bool:
+    """Whether a value is a list: an array of one number without axes has len(), too, which raises."""
+    try:
+        return len(value) >= 0
+    except TypeError:
+        return False
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number that a float can hold, and not NaN."""
+    try:
+        return isinstance(value, Real) and not math.isnan(value)
+    except OverflowError:
+        return False
 
 
 def real_array(values: Any, what: str, expected: str) -> "npt.NDArray[Any]":
@@ -182,6 +215,15 @@ def real_array(values: Any, what: str, expected: str) -> "npt.NDArray[Any]":
     if isinstance(values, np.ma.MaskedArray) and np.any(values.mask):
         raise ValueError(f"{what} with masked values: give {expected}, without a mask")
     return array
+
+
+def vector(values: Any, what: str, expected: str) -> "npt.NDArray[np.float64]":
+    """Three finite numbers as an array; the names are for error texts. Raises ValueError."""
+    with suppress(ValueError):
+        array = real_array(values, what, expected).astype(np.float64)
+        if array.shape == (3,) and np.isfinite(array).all():
+            return array
+    raise ValueError(f"{what} {shortened(values)}: give {expected}")
 
 
 def define(cls: Type[M], name: str, rows: Tuple[Tuple[Any, ...], ...]) -> Layout[M]:

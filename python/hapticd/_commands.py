@@ -1,6 +1,7 @@
 """Commands: from calls to messages of the wire. Both faces of the client inherit them."""
 
-from typing import Any, Sequence, Type, TypeVar
+from numbers import Real
+from typing import Any, Callable, Sequence, Type, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from .reports import Severity
 ALL_BUTTONS = -99
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 _PROPERTIES = ("stiffness", "damping", "static friction", "dynamic friction", "popthrough", "mass")
 
@@ -36,11 +38,18 @@ def instance(value: Any, cls: Type[T]) -> T:
     return value
 
 
-def flag(value: bool) -> int:
+def flag(value: bool, what: str = "") -> int:
     """A truth as messages carry it. Raises ValueError for what is none."""
-    if not isinstance(value, (bool, np.bool_)) and value not in (0, 1):
-        raise ValueError(f"{shortened(value)}: give True or False")
+    if not isinstance(value, (Real, np.bool_)) or value not in (0, 1):
+        raise ValueError(f"{what}{shortened(value)}: give True or False")
     return int(value)
+
+
+def function(callback: F, expected: str) -> F:
+    """The callback. Raises ValueError for what cannot be called."""
+    if not callable(callback):
+        raise ValueError(f"{shortened(callback)}: give {expected}")
+    return callback
 
 
 class Commands:

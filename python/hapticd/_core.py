@@ -1,15 +1,14 @@
 """The client without sockets: what both faces share. A face moves bytes, keeps time and waits."""
 
 import copy
+import math
 import os
 import secrets
-import struct
 import time
 import weakref
 from collections import deque
 from dataclasses import dataclass
-from numbers import Real
-from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, NoReturn, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +16,8 @@ import numpy.typing as npt
 from . import _messages as m
 from . import reports as r
 from ._address import Address
-from ._codec import HEADER, DecodeError, Numbers, by_class, frame, padded, real_array, shortened
-from ._commands import Commands, flag, instance
+from ._codec import HEADER, DecodeError, Numbers, by_class, frame, has_length, is_number, padded, real_array, shortened, utf8
+from ._commands import Commands, flag, function, instance
 from ._peer import Peer, now
 from ._statistics import Statistics
 from .errors import ConnectError, ConnectionLost, ServerError, Unsupported
@@ -62,8 +61,10 @@ class Options:
     def __post_init__(self) -> None:
         for name in ("connect_timeout", "send_timeout", "queue_limit_bytes"):
             value = getattr(self, name)
-            if not isinstance(value, Real) or not float(value) >= 0:
+            if not is_number(value) or value < 0:
                 raise ValueError(f"{name} is {shortened(value)}: give a number of at least 0")
+        for name in ("reconnect", "throw_on_error"):
+            flag(getattr(self, name), name + " is ")
 
 
 def options_of(options: Optional[Options], fields: Dict[str, Any]) -> Options:
@@ -212,7 +213,16 @@ def as_vertices(vertices: "npt.ArrayLike") -> "npt.NDArray[Any]":
     array = real_array(vertices, "vertices", "(n, 3) numbers")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"vertices of shape {array.shape}: give (n, 3)")
-    return np.ascontiguousarray(array, dtype=">f4")
+    with np.errstate(over="ignore", invalid="ignore"):
+        rows = np.ascontiguousarray(array, dtype=np.float32)
+    finite = np.isfinite(rows)
+    if not finite.all():
+        wrong = int(np.argmin(finite.all(axis=1)))
+        raise ValueError(
+            f"vertex {wrong} is {shortened(array[wrong].tolist())}: give finite numbers, at most 3.4e38, or leave it out with its "
+            "triangles"
+        )
+    return rows.astype(">f4")
 
 
 def as_corners(corners: "npt.ArrayLike") -> "npt.NDArray[Any]":
@@ -234,33 +244,35 @@ def as_triangles(triangles: "npt.ArrayLike", vertices: int) -> "npt.NDArray[Any]
     return np.ascontiguousarray(given, dtype=">i4")
 
 
-_CONTACT: Final = struct.Struct("24d")
+#: Members of a contact in the order of the wire.
+_CONTACT: Final = (
+    ("id", 1), ("shape", 1), ("radius_m", 1), ("point_m", 3), ("normal", 3), ("axis", 3), ("velocity_m_per_s", 3),
+    ("angular_velocity_rad_per_s", 3), ("stiffness_N_per_m", 1), ("damping_Ns_per_m", 1), ("static_friction", 1),
+    ("dynamic_friction", 1), ("lifetime_s", 1), ("yields", 1),
+)  # fmt: skip
 
 
-def _contact_numbers(contact: RemoteContact) -> Tuple[float, ...]:
-    """Raises ValueError for a vector that does not have three numbers, and for what is no number."""
-    c = instance(contact, RemoteContact)
-    try:
-        point, normal, axis, velocity, turn = (
-            (*v,) for v in (c.point_m, c.normal, c.axis, c.velocity_m_per_s, c.angular_velocity_rad_per_s)
-        )
-        if not len(point) == len(normal) == len(axis) == len(velocity) == len(turn) == 3:
-            raise ValueError
-        numbers = (
-            c.id, c.shape, c.radius_m, *point, *normal, *axis, *velocity, *turn, c.stiffness_N_per_m, c.damping_Ns_per_m,
-            c.static_friction, c.dynamic_friction, c.lifetime_s, c.yields,
-        )  # fmt: skip
-        _CONTACT.pack(*numbers)
-    except (struct.error, TypeError, ValueError, OverflowError) as error:
-        raise ValueError(
-            f"remote contacts: {contact}: give three numbers for each vector, and one for every other member"
-        ) from error
+def _contact_numbers(number: int, contact: RemoteContact) -> List[float]:
+    """Raises ValueError for a vector that does not have three numbers, and for what is no finite number."""
+    instance(contact, RemoteContact)
+    numbers: List[float] = []
+    for name, count in _CONTACT:
+        value = getattr(contact, name)
+        try:
+            parts = (value,) if count == 1 else (*value,)
+            if len(parts) != count or not all(map(math.isfinite, parts)):
+                raise ValueError
+        except (TypeError, ValueError, OverflowError) as error:
+            expected = "a finite number" if count == 1 else "three finite numbers"
+            raise ValueError(f"remote contact {number}: {name} is {shortened(value)}, expected {expected}") from error
+        numbers += parts
     return numbers
 
 
 def duration(seconds: float) -> float:
-    """A time in seconds. Raises ValueError for what is no number, which no time would end."""
-    if not isinstance(seconds, Real) or seconds != seconds:
+    """A time in seconds. Raises ValueError for what is no number, which no time would end. A negative one is over at
+    once: a loop with a clock of its own has one when it is late."""
+    if not is_number(seconds):
         raise ValueError(f"{shortened(seconds)}: give a time in seconds")
     return float(seconds)
 
@@ -286,6 +298,8 @@ if hasattr(os, "register_at_fork"):
 
 class Core(Commands):
     """Commands in, bytes out; bytes in, callbacks and latest reports out."""
+
+    _ELSEWHERE = ""  # what a call from another place is told
 
     def __init__(self, address: Address, options: Options) -> None:
         self.options = options
@@ -524,11 +538,16 @@ class Core(Commands):
         self._call(name, report)
 
     def _call(self, name: str, report: Any) -> None:
-        callbacks = self._callbacks[name]
-        if callbacks:
-            for subscription in tuple(callbacks):
-                if subscription.active:
+        """One that raises does not keep the report from the others. Raises what the first one raised."""
+        failure: Optional[Exception] = None
+        for subscription in tuple(self._callbacks[name]):
+            if subscription.active:
+                try:
                     subscription.callback(report)
+                except Exception as error:
+                    failure = failure or error
+        if failure is not None:
+            raise failure
 
     def _raise_first_error(self) -> None:
         if self.options.throw_on_error and self._first_error:
@@ -539,10 +558,11 @@ class Core(Commands):
 
     def _frame(self, message: Any) -> bytes:
         number, layout = _NUMBERS[type(message)]
-        return frame(*now(), 0, number, layout.encode(message))
+        return frame(*now(), 0, number, layout.encode(message, finite=True))
 
     def _send(self, message: Any, fast: bool = False) -> None:
         if fast and self._held is None and self.connected:
+            self._check_place()
             assert self._peer is not None
             one = self._frame(message)
             self._peer.send_fast(one)
@@ -585,14 +605,27 @@ class Core(Commands):
     def _put_now(self, message: Any) -> bool:
         """Appends a message ahead of a batch that is held; false without a connection. The face sends it. Raises
         ConnectionLost after close()."""
+        self._check_open()
         if not self.connected:
-            self._check_open()
             self._counts.messages_dropped += 1
             return False
         assert self._peer is not None
         self._peer.send_frames(self._frame(message))
         self._counts.messages_out += 1
         return True
+
+    def _is_used_elsewhere(self) -> bool:
+        """Whether this call comes from another place than the one that uses the client at present."""
+        raise NotImplementedError
+
+    def _check_place(self) -> None:
+        """Raises RuntimeError for a call that would mix its bytes with those of another thread."""
+        if self._is_used_elsewhere():
+            raise RuntimeError(f"this client of {self.device}@{self.server} {self._ELSEWHERE}")
+
+    def __reduce_ex__(self, _: Any) -> NoReturn:
+        """A copy would close the sockets of the first when it ends."""
+        raise TypeError(f"a client of {self.device}@{self.server} cannot be copied or pickled: connect where it is used")
 
     @property
     def connected(self) -> bool:
@@ -601,9 +634,10 @@ class Core(Commands):
         return self._peer is not None and self._peer.connected
 
     def _check_open(self) -> None:
-        """Raises ConnectionLost after close()."""
+        """Raises ConnectionLost after close(), and RuntimeError while another thread uses the client."""
         if self._finished:
             raise ConnectionLost(f"this client of {self.device}@{self.server} {self._over}")
+        self._check_place()
 
     def _check_renewed(self) -> None:
         """Raises ConnectionLost when the connection has ended and no other will follow."""
@@ -697,7 +731,7 @@ class Core(Commands):
     def _set_token(self, token: str) -> None:
         if not isinstance(token, str):
             raise ValueError(f"present_token(): {shortened(token)}: give a text")
-        if token and not 16 <= len(token.encode()) <= 128:
+        if token and not 16 <= len(utf8(token, "a token")) <= 128:
             raise ValueError(f"present_token(): {len(token.encode())} characters; a token has 16 to 128")
         self._check_open()
         self._frame(m.Identify(token, self._key))
@@ -718,14 +752,14 @@ class Core(Commands):
     def set_update_rate(self, rate_Hz: float) -> None:
         """Sets the report rate of this client, also for every new connection."""
         self._check_open()
-        self._frame(m.TrackerSetUpdateRate(rate_Hz))
+        self._check_rate(rate_Hz)
         if self.connected:
             super().set_update_rate(rate_Hz)
         self._update_rate = rate_Hz
 
     @staticmethod
     def _check_rate(rate_Hz: float) -> None:
-        if not isinstance(rate_Hz, Real) or not 0 <= rate_Hz < float("inf"):
+        if not is_number(rate_Hz) or not 0 <= rate_Hz < float("inf"):
             raise ValueError(f"a report rate of {shortened(rate_Hz)} Hz: give 0 (as it is) or more")
 
     def _set_heartbeats(self, enable: bool) -> None:
@@ -738,11 +772,11 @@ class Core(Commands):
     # --- streamed state
 
     def _put_contacts(self, contacts: Sequence[RemoteContact]) -> None:
-        if not hasattr(contacts, "__len__"):
+        if not has_length(contacts):
             raise ValueError(f"{shortened(contacts)}: give a list of hapticd.RemoteContact")
         if len(contacts) > 16:
             raise ValueError(f"{len(contacts)} remote contacts: give the 16 nearest to the hand")
-        numbers = [number for contact in contacts for number in _contact_numbers(contact)]
+        numbers = [one for number, contact in enumerate(contacts) for one in _contact_numbers(number, contact)]
         self._put_now(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
 
     def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:
@@ -828,9 +862,7 @@ class Core(Commands):
     # --- callbacks
 
     def _on(self, kind: str, callback: Callable[[Report], object]) -> "Subscription[Report]":
-        if not callable(callback):
-            raise ValueError(f"{shortened(callback)}: give a function that takes one report")
-        return Subscription(self._callbacks[kind], callback)
+        return Subscription(self._callbacks[kind], function(callback, "a function that takes one report"))
 
     def on(self, kind: str, callback: Callable[[Any], object]) -> "Subscription[Any]":
         """Adds a callback for a kind of reports by its name, as in hapticd.reports.KINDS, or "connection"."""

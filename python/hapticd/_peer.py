@@ -168,10 +168,8 @@ class Peer:
 
     def take_stream(self) -> bytes:
         """The bytes to be written to the TCP stream."""
-        data = self.stream[0] if len(self.stream) == 1 else b"".join(self.stream)
-        self.stream = []
-        self.stream_bytes = 0
-        return data
+        stream, self.stream, self.stream_bytes = self.stream, [], 0
+        return stream[0] if len(stream) == 1 else b"".join(stream)
 
     def take_datagrams(self) -> List[bytes]:
         """The datagrams to be sent, each with as many frames as fit."""

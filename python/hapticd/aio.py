@@ -13,12 +13,15 @@ program that sends much awaits flush_all() from time to time. What must wait for
 
 import asyncio
 import os
+import socket
 import time
 import weakref
 from collections import deque
 from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
-from typing import Any, AsyncIterator, Callable, Deque, Generator, List, Optional, Sequence, Set, Tuple, Type
+from typing import (
+    TYPE_CHECKING, Any, AsyncIterator, Callable, Deque, Generator, List, NoReturn, Optional, Sequence, Set, Tuple, Type,
+)  # fmt: skip
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +30,7 @@ from . import _messages as m
 from . import reports as r
 from ._address import local_towards, parse, resolve
 from ._codec import Numbers
+from ._commands import function
 from ._core import (
     BATCH_BYTES,
     CLOSED_BY_SERVER,
@@ -126,7 +130,7 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
         if lost is not None:
             await lost.wait()
         client = reference()
-        if client is None or (client._counts.connections and not client.options.reconnect):
+        if client is None or client._finished or (client._counts.connections and not client.options.reconnect):
             return
         del client
         await asyncio.sleep(RETRY_S)
@@ -229,6 +233,11 @@ class Client(Core):
     """One device of one server; see hapticd.Client for everything that both faces share. It belongs to one event
     loop. Made by connect()."""
 
+    _ELSEWHERE = (
+        "belongs to another event loop, or to the thread of one: asyncio.run_coroutine_threadsafe() or "
+        "loop.call_soon_threadsafe() hands it a call"
+    )
+
     def __init__(self, device: str, options: Options = Options()) -> None:
         super().__init__(parse(device), options)
         self._loop = asyncio.get_running_loop()
@@ -249,6 +258,10 @@ class Client(Core):
         self._adopted: Optional["asyncio.Future[None]"] = None
         self._task: Optional["asyncio.Task[None]"] = None
 
+    def _is_used_elsewhere(self) -> bool:
+        running = asyncio._get_running_loop()
+        return running is not self._loop and (running is not None or self._loop.is_running() or self._loop.is_closed())
+
     async def _start(self) -> None:
         self._target = await self._loop.run_in_executor(None, resolve, self._address)
         self._task = self._loop.create_task(_stay_connected(weakref.ref(self)))
@@ -263,12 +276,20 @@ class Client(Core):
         """Sends what is collected, waits until the server has read it, and closes all sockets, as
         hapticd.Client.close(); cancelled, it closes them at once. An `async with` block that is cancelled, as by Ctrl-C, waits
         no longer than 1 s. From its first step on every command, and everything that waits, raises ConnectionLost; `latest`
-        is empty. Does nothing the second time. A client whose last name is gone closes, too, as hapticd.Client, as long as
+        is empty. Does nothing the second time. In another event loop than the client's it ends the connection without waiting.
+        A client whose last name is gone closes, too, as hapticd.Client, as long as
         the event loop runs."""
         await self._close(float("inf"))
 
     async def _close(self, longest: float) -> None:
         if self._finished:
+            return
+        if self._is_used_elsewhere():
+            self._finished = True
+            sock = self._transport.get_extra_info("socket") if self._transport is not None else None
+            if sock is not None:
+                with suppress(OSError):  # it has ended already
+                    sock.shutdown(socket.SHUT_RDWR)
             return
         if self.connected:
             self._push()
@@ -524,6 +545,7 @@ class Client(Core):
 
     def flush(self) -> None:
         """Gives what is collected to the event loop now."""
+        self._check_place()
         self._push()
 
     async def flush_all(self) -> None:
@@ -575,6 +597,8 @@ class Client(Core):
         triangles: "Optional[npt.NDArray[Any]]",
         progress: Optional[Callable[[UploadProgress], object]],
     ) -> None:
+        if progress is not None:
+            function(progress, "a function that takes one hapticd.UploadProgress")
         await self._wait_answer()
         frames, messages = self._mesh_frames(object, vertices, triangles)
         if self._held is not None:
@@ -703,8 +727,8 @@ class Client(Core):
                 )
 
     async def rearm_forces(self) -> None:
-        """Ends a stop and clears latched trips; the force ramps in over half a second. Raises as
-        hapticd.Client.rearm_forces()."""
+        """Ends a stop and clears latched trips; the force ramps in over half a second. Acts only while its client is there, and
+        raises, as hapticd.Client.rearm_forces()."""
         await self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_key()
         self._send_at_once(m.RearmForces(), "forces not re-armed")
@@ -783,6 +807,11 @@ class _Connecting:
 
     def __await__(self) -> Generator[Any, None, Client]:
         return self._open().__await__()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise AttributeError(f"{name}: connect() gives the client to 'await connect(...)' or 'async with connect(...) as hand'")
 
     async def __aenter__(self) -> Client:
         self._client = await self._open()

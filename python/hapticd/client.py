@@ -13,6 +13,7 @@ import selectors
 import socket
 import struct
 import sys
+import threading
 import time
 from collections import deque
 from contextlib import contextmanager, suppress
@@ -25,6 +26,7 @@ from . import _messages as m
 from . import reports as r
 from ._address import Address, local_towards, parse, resolve
 from ._codec import Numbers
+from ._commands import function
 from ._core import (
     BATCH_BYTES,
     CLOSED_BY_SERVER,
@@ -122,11 +124,12 @@ class LossWatch:
 class Client(Core):
     """One device of one server: hapticd's own, or any other that speaks VRPN.
 
-    Thread: a client belongs to one thread and starts none. Several clients may live in several threads.
+    Thread: a client belongs to one thread and starts none. Several clients may live in several threads. A call while
+    another thread polls or waits raises RuntimeError, but stop_forces() and close() may come from any thread.
 
     Callbacks run in poll() and what polls (run_for(), reports(), rows()), in the order of arrival. An exception of a
-    callback leaves poll(); the remaining reports follow in the next poll(). A callback may call the client, but not
-    close it.
+    callback leaves poll() when the other callbacks have had the report; the remaining reports follow in the next poll(). A
+    callback may call the client; what polls raises ConnectionLost when one has closed it.
 
     Commands are collected and sent by the next poll(), flush(), or when 64 KiB have accumulated. Every command may
     therefore sleep, while more than Options.queue_limit_bytes wait for a slow server; raise ConnectionLost, when the
@@ -138,8 +141,12 @@ class Client(Core):
     and may wait for the server's answer to that question.
     """
 
+    _ELSEWHERE = "is in use by another thread: connect one client for each thread; only stop_forces() and close() may come from any"
+
     def __init__(self, device: str, options: Options = Options()) -> None:
         address = parse(device)
+        self._inside = 0  # the thread that moves bytes or sleeps
+        self._pushing = False
         super().__init__(address, options)
         self._target = resolve(address)
         self._selector = selectors.DefaultSelector()
@@ -171,11 +178,19 @@ class Client(Core):
         arrive meanwhile are discarded. From then on every command, and everything that waits, raises ConnectionLost;
         `latest` and statistics() stay. Does nothing the second time. A `with` block that Ctrl-C ends waits no longer than
         1 s. A client whose last name is gone closes, too; a callback that uses the client is such a name, until the
-        garbage collector runs."""
+        garbage collector runs. While another thread polls or waits, close() ends the connection without waiting, and that thread
+        gets ConnectionLost."""
         self._close(float("inf"))
 
     def _close(self, longest: float) -> None:
         if self._finished:
+            return
+        if self._is_used_elsewhere():
+            self._finished = True
+            sock = self._sock
+            if sock is not None:
+                with suppress(OSError):  # it has ended already
+                    sock.shutdown(socket.SHUT_RDWR)  # wakes the other thread
             return
         was_connected = self.connected
         if was_connected:
@@ -186,9 +201,12 @@ class Client(Core):
                 with suppress(OSError):
                     self._end_stream(self._sock, longest)
         finally:
-            self._drop_sockets()
-            self._closed("closed")
-            self._selector.close()
+            self._close_sockets()
+
+    def _close_sockets(self) -> None:
+        self._drop_sockets()
+        self._closed("closed")
+        self._selector.close()
 
     def _end_stream(self, sock: socket.socket, longest: float) -> None:
         """Ends the stream behind what is collected, and discards what arrives until the server has ended its own: the
@@ -385,17 +403,29 @@ class Client(Core):
                     self._out[0] = self._out[0][sent:]
 
     def _push(self) -> None:
-        """Gives collected bytes to the system, as far as it accepts them without waiting."""
+        """Gives collected bytes to the system, as far as it accepts them without waiting. What a signal handler collects
+        meanwhile goes with them."""
+        if not self._pushing:
+            try:  # also for a Ctrl-C between this line and the next
+                self._pushing = True
+                self._push_now()
+            finally:
+                self._pushing = False
+
+    def _push_now(self) -> None:
         peer, sock = self._peer, self._sock
         if peer is None or sock is None or self._connecting:
             return
         self._uncounted = 0
         try:
-            if peer.stream:
-                data = memoryview(peer.take_stream())
-                self._out.append(data)
-                self._out_bytes += len(data)
-            self._write(sock)
+            while True:
+                if peer.stream:
+                    data = memoryview(peer.take_stream())
+                    self._out.append(data)
+                    self._out_bytes += len(data)
+                self._write(sock)
+                if not peer.stream:
+                    break
         except OSError as error:
             return self._fail(str(error))
         except BaseException:
@@ -416,6 +446,18 @@ class Client(Core):
     def _step(self, timeout: float) -> None:
         """Sends, sleeps up to the timeout until something arrives or is due, receives. Runs no callbacks."""
         self._check_open()
+        try:
+            self._inside = threading.get_ident()
+            self._move(timeout)
+        finally:
+            self._inside = 0
+            if self._finished:  # by close() in another thread
+                self._close_sockets()
+
+    def _is_used_elsewhere(self) -> bool:
+        return self._inside not in (0, threading.get_ident())
+
+    def _move(self, timeout: float) -> None:
         at = time.monotonic()
         until = at + min(timeout, 3600.0)  # select() refuses longer times
         if self._sock is None and self._listener is None:
@@ -560,6 +602,7 @@ class Client(Core):
 
     def flush(self) -> None:
         """Sends what is collected as far as the system accepts it without waiting."""
+        self._check_place()
         self._push()
 
     def flush_all(self) -> None:
@@ -628,6 +671,8 @@ class Client(Core):
         triangles: "Optional[npt.NDArray[Any]]",
         progress: Optional[Callable[[UploadProgress], object]],
     ) -> None:
+        if progress is not None:
+            function(progress, "a function that takes one hapticd.UploadProgress")
         self._wait_answer()
         frames, messages = self._mesh_frames(object, vertices, triangles)
         if self._held is not None:
@@ -685,7 +730,12 @@ class Client(Core):
         sends the stop there and waits for the server's confirmation. Heartbeats continue meanwhile. Raises
         ConnectionLost without a connection, also when the server has ended it and nothing has been polled since
         (where the system says so: on Linux), and ConnectError when the second connection is not confirmed within
-        Options.connect_timeout (at least 1 s)."""
+        Options.connect_timeout (at least 1 s). May be called from any thread, and by a signal handler: while the client is in
+        use, only the second connection is used."""
+        if self._pushing or self._is_used_elsewhere():
+            if self._answered:
+                self._require_now(m.FEATURE_STOP, "stop the forces")
+            return self._stop_beside("this connection is in use", heartbeats=False)
         backlog = self._out_bytes + (self._peer.stream_bytes if self._peer is not None else 0)
         if self._sock is not None and not self._connecting:
             backlog += unacknowledged(self._sock)
@@ -695,7 +745,7 @@ class Client(Core):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
         if behind:
-            self._stop_beside(backlog)
+            self._stop_beside(f"it waits behind {backlog} bytes")
         else:
             self._check_arrival("forces not stopped")
         self._require(m.FEATURE_STOP, "stop the forces")
@@ -716,7 +766,7 @@ class Client(Core):
         if not self.connected:
             raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 
-    def _stop_beside(self, backlog: int) -> None:
+    def _stop_beside(self, why: str, heartbeats: bool = True) -> None:
         """The server handles the messages of a connection in order, so the pong confirms the stop."""
         timeout = max(self.options.connect_timeout, 1.0)
         deadline = time.monotonic() + timeout
@@ -728,16 +778,18 @@ class Client(Core):
                     sent = beside._put_now(self._identity()) and beside._put_now(m.StopForces())
                     beside._ping()
                 beside._step(0.005)
-                self._step(0.0)  # heartbeats
+                if heartbeats:
+                    self._step(0.0)
             if not (sent and beside._all_pongs):
                 raise ConnectError(
-                    f"stop not confirmed: it waits behind {backlog} bytes, and a second connection to {self.server} got "
-                    f"no answer: {beside._why_not_connected()}"
+                    f"stop not confirmed: {why}, and a second connection to {self.server} got no answer: "
+                    f"{beside._why_not_connected()}"
                 )
 
     def rearm_forces(self) -> None:
         """Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind the
-        commands sent before it, and never undoes a stop that is sent after it. Waits for a connection up to
+        commands sent before it, and never undoes a stop that is sent after it. It acts only while its client is there: a program that
+        ends waits until a GuardReport says that the device is not stopped any more, or the stop stands. Waits for a connection up to
         Options.connect_timeout (ConnectError); raises ConnectionLost when the connection turns out to have ended."""
         self._require(m.FEATURE_STOP, "re-arm the forces")
         self._put_key()
@@ -745,7 +797,7 @@ class Client(Core):
 
     def mark(self, text: str) -> None:
         """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. Sent at once,
-        even inside batch(). Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
+        even inside batch(). An empty text marks the time alone. Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
         stop_forces()."""
         self._send_at_once(m.Marker(0, text), "not marked")
 

@@ -368,7 +368,7 @@ def dtype_of(kind: str) -> "np.dtype[Any]":
     if kind == "contacts":  # one row for each contact
         return np.dtype([("time", "f8"), ("tick", "u8"), ("tick_time_ns", "i8"), ("object", "i8"),
                          ("point_m", "f8", 3), ("normal", "f8", 3), ("force_N", "f8", 3)])  # fmt: skip
-    if kind not in KINDS or kind in ("text", "analog"):
+    if not isinstance(kind, str) or kind not in KINDS or kind in ("text", "analog"):
         known = ", ".join(name for name in KINDS if name not in ("text", "analog"))
         raise ValueError(f"no rows of kind {kind!r}; there are {known}")
     columns: List[Any] = []

@@ -6,12 +6,13 @@ instead. Servers check the values: a value out of range is clamped, an invalid o
 """
 
 import enum
+from numbers import Integral, Real
 from typing import NamedTuple, Tuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ._codec import Numbers
+from ._codec import Numbers, shortened, vector
 
 #: The identity; matrices are 4x4 arrays that act on column vectors: the translation is in [:3, 3].
 IDENTITY: npt.NDArray[np.float64] = np.eye(4)
@@ -21,7 +22,7 @@ IDENTITY.setflags(write=False)
 def translation(x: float, y: float, z: float) -> npt.NDArray[np.float64]:
     """The 4x4 matrix that translates by (x, y, z)."""
     matrix = np.eye(4)
-    matrix[:3, 3] = x, y, z
+    matrix[:3, 3] = vector((x, y, z), "a translation by", "three finite numbers")
     return matrix
 
 
@@ -198,18 +199,17 @@ class RemoteContact(NamedTuple):
 
 def sphere(radius: float, center: Numbers = (0.0, 0.0, 0.0), rings: int = 32) -> "Tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]":
     """A sphere as (vertices (n, 3), triangles (m, 3)) for upload_mesh(), in world units."""
-    if rings < 3:
-        raise ValueError(f"a sphere of {rings} rings: give at least 3")
-    if not 0 < radius < np.inf:
-        raise ValueError(f"a sphere of radius {radius}: give a number above 0")
-    if np.shape(center) != (3,) or not np.isfinite(center).all():
-        raise ValueError(f"a sphere around {center}: give x, y and z")
+    if not isinstance(rings, Integral) or rings < 3:
+        raise ValueError(f"a sphere of {shortened(rings)} rings: give a whole number of at least 3")
+    if not isinstance(radius, Real) or not 0 < radius < 3.4e38:
+        raise ValueError(f"a sphere of radius {shortened(radius)}: give a number above 0")
+    middle_point = vector(center, "a sphere around", "x, y and z")
     segments = 2 * rings
     polar = np.linspace(0, np.pi, rings + 1)[1:-1]
     around = np.arange(segments) * (2 * np.pi / segments)
     p, a = np.meshgrid(polar, around, indexing="ij")
     middle = np.stack([np.sin(p) * np.cos(a), np.cos(p), np.sin(p) * np.sin(a)], axis=-1).reshape(-1, 3)
-    points = np.concatenate([[[0, 1, 0]], middle, [[0, -1, 0]]]) * radius + np.asarray(center)
+    points = np.concatenate([[[0, 1, 0]], middle, [[0, -1, 0]]]) * radius + middle_point
     i = np.arange(segments)
     j = (i + 1) % segments
     top = np.stack([np.zeros_like(i), 1 + j, 1 + i], axis=1)

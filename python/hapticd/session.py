@@ -25,6 +25,8 @@ _VERSION: Final = 2
 _HEADER, _SCENE, _PUBLISH, _TICKS, _LOST, _END, _LAW, _STREAM, _PASSIVITY, _MARKER, _MEMORY = range(1, 12)
 _REMOTE_MEMORY, _LEFT, _WALL_OFFSET = 12, 13, 14
 _MAX_CONTACTS: Final = 1024
+#: By which a recording is known again: they hold its time and configuration.
+_BEGINNING_BYTES: Final = 4096
 
 _FIXED: Final = np.dtype(
     [
@@ -231,7 +233,16 @@ class Ticks:
     def __len__(self) -> int:
         return len(self._offsets)
 
+    def __iter__(self) -> Iterator[str]:
+        """The names of the columns, as a DataFrame has them."""
+        return iter(self.columns)
+
+    def __contains__(self, column: object) -> bool:
+        return column in self.columns
+
     def __getitem__(self, column: str) -> "npt.NDArray[Any]":
+        if isinstance(column, (list, slice)):
+            raise KeyError(f"{column}: give the name of one column; to_array() takes several, and a column takes rows")
         if column not in self._cache:
             if column not in self.columns and column != "flags":
                 raise KeyError(f"no column {column!r}; there are {', '.join(self.columns)}")
@@ -301,8 +312,10 @@ class Ticks:
         column. Needs pandas."""
         import pandas  # type: ignore[import]
 
+        if columns is None:
+            columns = ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons")
         table: Dict[str, Any] = {}
-        for name in _names(columns or ("tick", "hip_m", "proxy_m", "velocity_m_per_s", "force_N", "depth_m", "object", "buttons")):
+        for name in _names(columns):
             array = self[name]
             if array.ndim == 1:
                 table[name] = array
@@ -344,7 +357,8 @@ class Ticks:
 class Session:
     """A recording. The file is mapped into memory; opening it reads the heads of its blocks and, with `verify`, checks
     their checksums. Like every reader of this format it stops before the first damaged or incomplete block: `remark`
-    then names its byte. Raises RecordingError for a file that is no recording, and OSError."""
+    then names its byte. A recording that is still written is read as far as it was when it was opened. Raises RecordingError
+    for a file that is no recording, and later when another program has cut or overwritten the file; and OSError."""
 
     def __init__(self, path: "Union[str, os.PathLike[str]]", verify: bool = True) -> None:
         self.path = os.fspath(path)
@@ -354,6 +368,7 @@ class Session:
                 raise RecordingError(f"'{self.path}' is not a recording of hapticd: it does not start with HAPTICS")
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self._bytes = memoryview(self._map)
+        self._beginning = bytes(self._bytes[:_BEGINNING_BYTES])
         self._data: npt.NDArray[np.uint8] = np.frombuffer(self._map, dtype=np.uint8)
         self._ticks: Dict[int, Ticks] = {}
         self._ended = False
@@ -408,8 +423,11 @@ class Session:
             at = start + length
 
     def _check_open(self) -> None:
+        """Before each read. The system ends a program that reads a mapped file behind its end."""
         if self._closed:
             raise ValueError(f"the session of '{self.path}' is closed")
+        if self._map.size() < len(self._bytes) or self._bytes[: len(self._beginning)] != self._beginning:
+            raise RecordingError(f"another program has cut or overwritten '{self.path}' since it was opened: open it again")
 
     def _content(self, start: int, length: int) -> _Unpacker:
         self._check_open()

@@ -74,6 +74,7 @@ def test_a_sphere_is_felt(server: Server, way: str) -> None:
             await hand.stop_forces()
             await until(hand, lambda: hand.latest.guard.stopped)
             await hand.rearm_forces()
+            await until(hand, lambda: not hand.latest.guard.stopped)
             await hand.release_hand()
             assert (hand.statistics().udp_bytes_in > 0) == (way == "udp")
 
@@ -332,6 +333,66 @@ def test_an_exception_of_a_callback_goes_to_the_loop(server: Server) -> None:
     run(main())
 
 
+def test_a_callback_that_raises_does_not_keep_reports_from_what_waits(server: Server, caplog: pytest.LogCaptureFixture) -> None:
+    async def run() -> int:
+        async with hapticd.aio.connect(server.tcp) as hand:
+            hand.on_text(lambda report: 1 / 0)
+            hand.set_transform(0, np.zeros((4, 4)))  # refused by a text
+            async for report in hand.reports("text", seconds=60):
+                return int(report.severity)
+            return -1
+
+    assert asyncio.run(run()) == hapticd.Severity.ERROR
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_call_of_another_loop_or_thread_is_refused(server: Server) -> None:
+    async def call_by_a_thread() -> hapticd.aio.Client:
+        hand = await hapticd.aio.connect(server.tcp)
+        sent = hand.statistics().messages_out
+        for call in (lambda: hand.clear_mesh(0), hand.flush, lambda: hand.set_force_field(hapticd.ForceField())):
+            with pytest.raises(RuntimeError, match="belongs to another event loop, or to the thread of one"):
+                await asyncio.get_running_loop().run_in_executor(None, call)
+        assert hand.statistics().messages_out == sent
+        hand.clear_mesh(0)
+        await hand.flush_all()
+        return hand
+
+    async def use(hand: hapticd.aio.Client) -> None:
+        for wait in (lambda: hand.poll(60), hand.stop_forces, lambda: hand.mark("x"), lambda: hand.collect("force", 60)):
+            with pytest.raises(RuntimeError, match="belongs to another event loop"):
+                await wait()  # type: ignore[no-untyped-call]
+
+    hand = asyncio.run(call_by_a_thread())
+    asyncio.run(use(hand))
+    ends = [line for line in server.log if "disconnected" in line]
+    asyncio.run(hand.close())  # its own loop has ended
+    assert hand._finished
+    deadline = time.monotonic() + 60
+    while [line for line in server.log if "disconnected" in line] == ends:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_a_connection_that_is_not_awaited_says_so() -> None:
+    with pytest.raises(AttributeError, match=r"^set_surface: connect\(\) gives the client to 'await connect"):
+        hapticd.aio.connect("Phantom@localhost").set_surface(0, Surface())  # type: ignore[attr-defined]
+    assert not hasattr(hapticd.aio.connect("Phantom@localhost"), "__enter__")
+
+
+def test_another_thread_may_close_a_client(server: Server) -> None:
+    async def run() -> None:
+        hand = await hapticd.aio.connect(server.tcp)
+        await asyncio.get_running_loop().run_in_executor(None, lambda: asyncio.run(hand.close()))
+        with pytest.raises(hapticd.ConnectionLost, match="is closed"):
+            await hand.poll(60)
+        assert hand._task is not None
+        await asyncio.wait_for(hand._task, 60)
+        assert not hand.connected
+
+    asyncio.run(run())
+
+
 def test_a_stop_passes_a_large_upload(server: Server) -> None:
     async def main() -> None:
         vertices, triangles = hapticd.sphere(25, rings=300)
@@ -477,8 +538,10 @@ def test_errors() -> None:
             await hand.upload_mesh(0, np.eye(3), [[0, 1, 2]])
         scripted.close()
         wrong = ScriptedServer(device="Tracker0")
-        with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
-            await hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0.3)
+        async with hapticd.aio.connect(wrong.name.replace("Tracker0", "Phantom"), connect_timeout=0) as nobody:
+            await until(nobody, lambda: nobody._server_devices)
+            with pytest.raises(hapticd.ConnectError, match="no device 'Phantom' answers at .*; it has Tracker0"):
+                await nobody.wait_connected(0.3)
         wrong.close()
 
     run(main())

@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+import copy
 import gc
 import os
 import pathlib
+import pickle
 import select
 import shutil
 import signal
@@ -477,8 +479,10 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         hapticd.connect("Phantom@http://localhost:3883")
     with pytest.raises(ValueError, match="port '99999', expected 1 to 65535"):
         hapticd.connect("Phantom@localhost:99999")
-    with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
-        hapticd.connect(server.tcp.replace("Phantom", "Nobody"), connect_timeout=0.3)
+    with hapticd.connect(server.tcp.replace("Phantom", "Nobody"), connect_timeout=0) as nobody:
+        until(nobody, lambda: nobody._server_devices)
+        with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
+            nobody.wait_connected(0.3)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1"):
@@ -658,6 +662,141 @@ def test_a_poll_in_a_callback_does_not_keep_the_outer_poll() -> None:
         until(hand, lambda: len(seen) == many)
         assert seen == list(range(1, many + 1))
     scripted.close()
+
+
+def test_one_callback_that_raises_does_not_keep_a_report_from_the_others(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        heard: List[Any] = []
+
+        def first(report: Any) -> None:
+            raise KeyError("of the first")
+
+        def last(report: Any) -> None:
+            raise KeyError("of the last")
+
+        hand.on_text(first)
+        hand.on_text(heard.append)
+        hand.on_text(last)
+        hand.set_transform(0, np.zeros((4, 4)))  # refused by a text
+        deadline = time.monotonic() + 60
+        with pytest.raises(KeyError, match="of the first"):
+            while time.monotonic() < deadline:
+                hand.poll(1)
+        assert [report.severity for report in heard] == [hapticd.Severity.ERROR]
+
+
+@pytest.mark.parametrize("way", ["tcp", "udp"])
+def test_a_call_while_another_thread_polls_is_refused_but_a_stop_acts(server: Server, way: str) -> None:
+    """Two threads would mix their bytes in one stream, and the server would end it."""
+    with hapticd.connect(getattr(server, way)) as hand, hapticd.connect(server.tcp) as other:
+        hand.wait_capabilities()
+        asleep, awake = threading.Event(), threading.Event()
+        select = hand._select
+
+        def sleep(timeout: float) -> Any:
+            asleep.set()
+            awake.wait(60)
+            return select(0.0)
+
+        hand._select = sleep  # type: ignore[method-assign,assignment]
+        worker = threading.Thread(target=hand.poll)
+        worker.start()
+        try:
+            assert asleep.wait(60)
+            sent = hand.statistics().messages_out
+            calls: Dict[str, Any] = {**COMMANDS, **WAITS, "flush": ()}
+            for call in sorted(set(calls) - {"stop_forces", "wait_capabilities"}):
+                with pytest.raises(RuntimeError, match="in use by another thread: connect one client for each thread"):
+                    getattr(hand, call)(*calls[call])
+            with pytest.raises(RuntimeError, match="in use by another thread"):
+                with hand.batch():
+                    hand.clear_mesh(0)
+            assert hand.statistics().messages_out == sent
+            hand.stop_forces()
+            deadline = time.monotonic() + 60
+            while not other.latest.guard.stopped and time.monotonic() < deadline:
+                other.poll(0.1)
+            assert other.latest.guard.stopped
+        finally:
+            awake.set()
+            worker.join(60)
+            hand._select = select  # type: ignore[method-assign]
+        rearm(hand, other)
+        assert hand.statistics().connections == 1
+
+
+def rearm(hand: hapticd.Client, other: hapticd.Client) -> None:
+    """Ends a stop that the other one has seen. A re-arm acts only while its client is there."""
+    hand.rearm_forces()
+    until(other, lambda: not other.latest.guard.stopped)
+
+
+class Interrupted:
+    """A socket during whose first send() a signal arrives."""
+
+    def __init__(self, sock: Any, handler: Callable[[], None]) -> None:
+        self._sock = sock
+        self._handlers = [handler]
+
+    def send(self, data: Any) -> int:
+        sent = int(self._sock.send(data))
+        while self._handlers:
+            self._handlers.pop()()
+        return sent
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._sock, name)
+
+
+def test_a_signal_handler_may_stop_the_forces_while_bytes_are_written(server: Server) -> None:
+    with hapticd.connect(server.tcp) as hand, hapticd.connect(server.tcp) as other:
+        hand.wait_capabilities()
+        assert not other.latest.guard.stopped
+
+        def handler() -> None:
+            hand.mark("in a handler")
+            hand.stop_forces()
+
+        hand._sock = Interrupted(hand._sock, handler)  # type: ignore[assignment]
+        texts: List[str] = []
+        hand.on_text(lambda report: texts.append(report.text))
+        hand.upload_mesh(0, *hapticd.sphere(25))
+        until(other, lambda: other.latest.guard.stopped)
+        until(hand, lambda: "marked for all clients; this server records nothing" in texts)
+        assert hand.statistics().connections == 1
+        hand._sock = hand._sock._sock  # type: ignore[attr-defined]
+        rearm(hand, other)
+
+
+def test_another_thread_may_close_a_client_that_waits(server: Server) -> None:
+    hand = hapticd.connect(server.tcp)
+    ends: List[BaseException] = []
+
+    def work() -> None:
+        try:
+            hand.run_for(3600)
+        except BaseException as end:
+            ends.append(end)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    while not hand._inside and worker.is_alive():
+        time.sleep(0.001)
+    hand.close()
+    worker.join(60)
+    assert [type(end) for end in ends] == [hapticd.ConnectionLost]
+
+
+def test_a_client_is_not_copied(server: Server) -> None:
+    """The copy would close the sockets of the first when it ends."""
+    with hapticd.connect(server.tcp) as hand:
+        for attempt in (copy.copy, copy.deepcopy, pickle.dumps):
+            with pytest.raises(TypeError, match="cannot be copied or pickled: connect where it is used"):
+                attempt(hand)
+        hand.run_for(0.01)
+        assert hand.connected
+        report = hand.latest.guard
+        assert pickle.loads(pickle.dumps(report)) == copy.deepcopy(report) == report
 
 
 def test_ctrl_c_ends_a_wait_and_nothing_is_left(server: Server) -> None:
@@ -899,9 +1038,9 @@ def test_streamed_state_is_reported_back() -> None:
             assert "hapticd Batch_Begin" not in [name for name, _ in scripted.received]
         with pytest.raises(ValueError, match="17 remote contacts: give the 16 nearest"):
             hand.set_remote_contacts([hapticd.RemoteContact(i, (0, 0, 0), (0, 1, 0)) for i in range(17)])
-        with pytest.raises(ValueError, match="give three numbers for each vector"):
+        with pytest.raises(ValueError, match=r"point_m is \(0, 0\), expected three finite numbers"):
             hand.set_remote_contacts([hapticd.RemoteContact(0, (0, 0), (0, 1, 0))])
-        with pytest.raises(ValueError, match="give three numbers for each vector"):
+        with pytest.raises(ValueError, match=r"point_m is \(0, 0\), expected three finite numbers"):
             hand.set_remote_contacts([hapticd.RemoteContact(0, (0, 0), (0, 0, 1, 0))])
         with pytest.raises(ValueError, match="3 numbers"):
             hand.set_workspace_box((0, 0), (1, 1, 1, 1))

@@ -47,6 +47,25 @@ def test_the_notebook_is_committed_without_results() -> None:
     assert all(cell.get("outputs", []) == [] for cell in notebook.cells)
 
 
+def test_the_scene_of_the_document_leaves_the_forces_armed(server: Server, tmp_path: pathlib.Path) -> None:
+    """A re-arm whose client is gone at once does not act."""
+    section = (ROOT / "docs/python.md").read_text().split("## Scenes")[1].split("\n## ")[0]
+    (program,) = re.findall(r"```python\n(.*?)```", section, re.S)
+    assert "rearm_forces()" in program
+    file = tmp_path / "scene.py"
+    file.write_text(program.replace("Phantom@localhost", server.tcp))
+    with hapticd.connect(server.tcp) as other:
+        stops: "list[bool]" = []
+        other.on_guard(lambda report: stops.append(report.stopped))
+        done = subprocess.run([sys.executable, str(file)], capture_output=True, text=True, cwd=tmp_path, timeout=300)
+        assert done.returncode == 0, done.stderr
+        for _ in range(600):
+            other.poll(0.1)
+            if True in stops and not stops[-1]:  # a late tick is reported by further ones
+                return
+    raise AssertionError(stops)
+
+
 def test_the_ten_lines_feel_the_sphere(server: Server, tmp_path: pathlib.Path) -> None:
     section = (ROOT / "docs/python.md").read_text().split("## Ten lines")[1].split("\n## ")[0]
     program, plot = re.findall(r"```py(?:thon)?\n(.*?)```", section, re.S)

@@ -298,6 +298,51 @@ def test_damage_is_named_and_everything_before_it_is_read(tmp_path: pathlib.Path
         hapticd.Session(file)
 
 
+@pytest.mark.parametrize("what", ["cut", "emptied", "overwritten"])
+def test_a_recording_that_another_program_changes_ends_with_a_text(tmp_path: pathlib.Path, what: str) -> None:
+    """Reading a mapped file behind its end would end the program without one."""
+    file = tmp_path / "a.haptics"
+    whole = (RECORDINGS / "gripper_v2.haptics").read_bytes()
+    file.write_bytes(whole)
+    with hapticd.Session(file) as session:
+        ticks = session.ticks
+        read = ticks["tick"]
+        with open(file, "r+b") as other:
+            if what == "overwritten":
+                other.write(bytes(len(whole)))
+            else:
+                other.truncate(4096 if what == "cut" else 0)
+        for use in (lambda: ticks["force_N"], ticks.contacts, lambda: list(session.commands()), lambda: session.markers):
+            with pytest.raises(hapticd.RecordingError, match="another program has cut or overwritten .*a.haptics.*: open it again"):
+                use()
+        assert len(ticks["tick"]) == len(read) > 0
+
+
+def test_a_recording_that_grows_is_read_as_far_as_it_was(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "a.haptics"
+    whole = (RECORDINGS / "gripper_v2.haptics").read_bytes()
+    cut = len(whole) - 20
+    file.write_bytes(whole[:cut])
+    with hapticd.Session(file) as session:
+        count = len(session.ticks)
+        with open(file, "ab") as other:
+            other.write(whole[cut:])
+        assert len(session.ticks["force_N"]) == count > 0
+        assert session.remark
+    with hapticd.Session(file) as session:
+        assert not session.remark
+
+
+def test_columns_are_found_by_their_names() -> None:
+    with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
+        ticks = session.ticks
+        assert "force_N" in ticks and "force_N_x" not in ticks and 0 not in ticks
+        assert tuple(ticks) == ticks.columns
+        for several in (["force_N", "tick"], slice(0, 3)):
+            with pytest.raises(KeyError, match="give the name of one column"):
+                ticks[several]  # type: ignore[index]
+
+
 def test_columns_outlive_the_session() -> None:
     with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
         ticks, opening = session.ticks, session.ticks["gripper_rad"]

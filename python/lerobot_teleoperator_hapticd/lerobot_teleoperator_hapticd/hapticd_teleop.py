@@ -1,5 +1,6 @@
 """The teleoperator: actions from pose, gripper and buttons; feedback by a force or a contact."""
 
+import logging
 import math
 import time
 from collections import deque
@@ -21,6 +22,8 @@ _CONTACT = (
 _EFFECT = 63  # the last of the server's 64 effects: a program beside this one starts from 0
 _PLANE = 7  # likewise
 _SENSORS = {"proxy": 0, "hand": 1}
+_LOG = logging.getLogger(__name__)
+_LEVELS = {hapticd.Severity.WARNING: logging.WARNING, hapticd.Severity.ERROR: logging.ERROR}
 
 
 #: What the fields of the configuration must be.
@@ -30,7 +33,8 @@ _LIMITS: Dict[str, Tuple[str, Callable[[float], bool]]] = {
     "scale": ("a finite number other than 0", lambda value: value != 0 and math.isfinite(value)),
     "gripper_open_rad": ("a finite number above 0", lambda value: 0 < value < math.inf),
     **dict.fromkeys(("offset_x", "offset_y", "offset_z"), _FINITE),
-    **dict.fromkeys(("rate_Hz", "buttons", "feedback_hold_s", "max_force_N"), _NOT_NEGATIVE),
+    **dict.fromkeys(("rate_Hz", "connect_timeout", "feedback_hold_s", "max_force_N"), _NOT_NEGATIVE),
+    **dict.fromkeys(("buttons", "gripper_button"), ("a whole number of at least 0", lambda number: number >= 0 and number.is_integer())),
 }
 
 
@@ -107,6 +111,7 @@ class HapticdTeleop(Teleoperator):
         self.disconnect()
         self._hand = hapticd.connect(self.config.device, connect_timeout=self.config.connect_timeout)
         self._hand.on_connection(self._connections.append)
+        self._hand.on_text(self._log)
         try:
             self.configure()
             if not self._wait_reported(self._hand):
@@ -114,6 +119,10 @@ class HapticdTeleop(Teleoperator):
         except BaseException:
             self.disconnect()
             raise
+
+    def _log(self, report: hapticd.TextReport) -> None:
+        """What the server says, such as why it refuses a feedback, is to be seen: otherwise nothing is felt, and nobody knows why."""
+        _LOG.log(_LEVELS.get(report.severity, logging.INFO), "%s: %s", self.config.device, report.text)
 
     @property
     def is_calibrated(self) -> bool:

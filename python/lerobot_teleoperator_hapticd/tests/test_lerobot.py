@@ -305,7 +305,8 @@ def test_what_is_wrong_is_named(server: Server) -> None:
     "name, value",
     [
         ("offset_y", float("nan")), ("buttons", -1), ("gripper_open_rad", 0.0), ("feedback_hold_s", -1.0),
-        ("max_force_N", -0.5), ("rate_Hz", -1.0), ("scale", "1"),
+        ("max_force_N", -0.5), ("rate_Hz", -1.0), ("scale", "1"), ("buttons", 2.5), ("gripper_button", -1),
+        ("gripper_button", "a"), ("connect_timeout", -1.0),
     ],
 )  # fmt: skip
 def test_a_configuration_out_of_range_is_named_before_the_session(server: Server, name: str, value: Any) -> None:
@@ -328,6 +329,15 @@ def test_feedback_that_is_wrong_acts_in_no_part(server: Server) -> None:
         other.run_for(0.2)
         assert abs(other.latest.force.force_N[2]) < 0.2
         assert not teleop._force and not teleop._contact
+
+
+def test_what_the_server_refuses_is_in_the_log(server: Server, caplog: pytest.LogCaptureFixture) -> None:
+    """Otherwise nothing is felt, and nobody knows why."""
+    with make(server) as teleop:
+        teleop.send_feedback({"contact_y": 1e30, "contact_ny": 1.0, "contact_stiffness": 500.0})  # far away from everything
+        until(lambda: teleop.get_action() and caplog.records)
+    assert caplog.records[-1].levelname == "ERROR"
+    assert f"{server.tcp}: sendSurface plane 7" in caplog.text and "refused" in caplog.text
 
 
 def test_a_demonstration_of_a_hundred_frames(server: Server) -> None:
