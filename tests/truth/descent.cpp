@@ -8,18 +8,17 @@ namespace hapticd::truth {
 namespace {
 
 constexpr double kShortest_m = 2e-8;  // a shorter way leads nowhere
-constexpr double kSlack_m = 2e-9;     // by which a ball may overlap a face
-constexpr double kClimb_m = 1e-9;     // by which a rolling ball may climb
-constexpr int kSteps = 40;
 constexpr int kRollSteps = 64;
+constexpr std::size_t kGrooves = 4;  // of this many faces
 
 }  // namespace
 
 Descent::Descent(const Reference& reference, const Point& centre, double reach, double radius_m,
-                 std::uint64_t seed)
+                 std::uint64_t seed, double slack_m)
     : reference_(reference),
       reach_(reach),
       radius_(radius_m),
+      slack_(slack_m),
       faces_(reference.near(centre, reach + radius_m)),
       random_(seed) {}
 
@@ -36,7 +35,7 @@ bool Descent::passesNone(const Point& p, const Point& q) const {
 // Moves the centre of a ball off the faces that it overlaps.
 bool Descent::pushedOut(Point& x) const {
   for (int k = 0; k < 40; ++k) {
-    double nearest = radius_ - kSlack_m;
+    double nearest = radius_ - slack_;
     Point away = Point::Zero();
     for (const int i : faces_) {
       const Face& f = reference_.face(i);
@@ -60,22 +59,29 @@ bool Descent::rolls(const Point& x, const Point& end, const Point& goal) const {
     Point next = x + static_cast<double>(k) / kRollSteps * (end - x);
     if (!pushedOut(next) || !passesNone(before, next)) return false;
     if ((next - before).norm() > 2 * (end - x).norm() / kRollSteps) return false;
-    if ((goal - next).norm() > (goal - x).norm() + kClimb_m) return false;
+    if ((goal - next).norm() > (goal - x).norm() + 0.5 * slack_) return false;
     before = next;
   }
   return true;
 }
 
-// The free space of a ball has round faces: a step along them, then out of them.
+// The free space of a ball has round faces: a step along one of them, or along two, then out of them.
 Point Descent::step(const Point& x, const Point& goal, double length) {
   const Point pull = goal - x;
-  std::vector<Point> ways{pull};
+  std::vector<Point> normals;
   for (const int i : faces_) {
     const Face& f = reference_.face(i);
     if ((x - nearestOf(f, x)).norm() > radius_ + 1e-6) continue;
-    const Point n = (x - nearestOf(f, x)).stableNormalized();
-    ways.push_back(pull - n * n.dot(pull));
-    if (ways.size() > 12) break;
+    normals.push_back((x - nearestOf(f, x)).stableNormalized());
+    if (normals.size() > 11) break;
+  }
+  std::vector<Point> ways{pull};
+  for (const Point& n : normals) ways.push_back(pull - n * n.dot(pull));
+  for (std::size_t i = 0; i < std::min(normals.size(), kGrooves); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const Point along = normals[i].cross(normals[k]).stableNormalized();
+      ways.push_back(along * along.dot(pull));
+    }
   }
   for (int i = 0; i < 4; ++i) ways.push_back(randomDirection());
   for (const Point& way : ways) {
@@ -87,16 +93,14 @@ Point Descent::step(const Point& x, const Point& goal, double length) {
   return x;
 }
 
-Point Descent::from(const Point& start, const Point& goal) {
+Point Descent::from(const Point& start, const Point& goal, int steps, double first_m) {
   Point x = start;
   if (!pushedOut(x)) return start;
-  double length = 1e-4;
-  for (int i = 0; i < kSteps && (x - start).norm() < 0.5 * reach_; ++i) {
+  double length = first_m;
+  for (int i = 0; i < steps && (x - start).norm() < 0.5 * reach_; ++i) {
     const Point next = step(x, goal, std::min(length, 0.25 * reach_));
-    if (next == x) {
-      length *= 0.3;
-      if (length < 1e-6) break;
-    }
+    length = next == x ? 0.3 * length : std::min(2 * length, kLongestStep_m);
+    if (length < std::min(1e-6, 0.05 * first_m)) break;
     x = next;
   }
   return x;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "truth/descent.h"
@@ -17,6 +18,8 @@ constexpr std::size_t kFollowers = 4;                          // where the plac
 constexpr std::array<double, 3> kWidenings_m{30e-6, 5e-6, 0};  // of the faces between ball and proxy
 constexpr double kFarthestBall_m = 60e-6;  // the reported proxy is at most 50 um from the ball that touches
 constexpr double kRolling = 1.01;          // radii: a rolling ball may overlap faces by 2 nm
+constexpr int kRolls = 3;                  // some of its directions are random
+constexpr int kSteps = 200;                // of a roll
 constexpr double kBehind =
     2.5;  // radii: a proxy nearer to the ball may be in front of a face that it is behind
 
@@ -43,7 +46,7 @@ class Follower {
         continue;
       }
       if (reference_.moved()) carry(p);
-      arrived = moveTo(p);
+      arrived = moveTo(proxies_[tick]);
       // A way that only the first opinion found.
       if (!arrived && tick + 1 < proxies_.size()) places_ = around(p);
     }
@@ -119,11 +122,11 @@ class Follower {
   }
 
   // False when no way leads to the proxy.
-  bool moveTo(const Point& p) {
+  bool moveTo(const ReportedProxy& proxy) {
     bool decided = false;
     std::vector<Point> arrived;
     for (const Point& ball : places_) {
-      const auto end = endOf(ball, p, decided);
+      const auto end = endOf(ball, proxy, decided);
       if (end) addOther(*end, arrived);
       if (arrived.size() == kFollowers) break;
     }
@@ -133,17 +136,33 @@ class Follower {
 
   // First where the ball gets by rolling, if the proxy may be reported from there: other ends are places
   // around the proxy, which may all be on the wrong side of a face that it is on.
-  std::optional<Point> endOf(const Point& ball, const Point& p, bool& decided) {
-    Descent descent(reference_, ball, (p - ball).norm() + 400e-6, kRolling * radius_, ++seed_);
-    const Point rolled = descent.from(ball, p);
+  std::optional<Point> endOf(const Point& ball, const ReportedProxy& proxy, bool& decided) {
+    const Point& p = proxy.at;
     const FreeSpace space(reference_, p, kFarthestBall_m, radius_, seed_);
-    if ((rolled - p).norm() <= kFarthestBall_m && space.clear(rolled, rolled) &&
-        seesProxy(space, p, 0)(rolled)) {
+    const auto end = rolledTo(ball, proxy, [&](const Point& q) {
+      return (q - p).norm() <= kFarthestBall_m && space.clear(q, q) && seesProxy(space, p, 0)(q);
+    });
+    if (end) {
       decided = true;
-      return rolled;
+      return end;
     }
-    const auto end = endOf(ball, p, false, decided);
-    return end || trial_.sides == Sides::both ? end : endOf(ball, p, true, decided);
+    const auto other = endOf(ball, p, false, decided);
+    return other || trial_.sides == Sides::both ? other : endOf(ball, p, true, decided);
+  }
+
+  // Straight to the proxy; or as the proxy went, each part of its way nearer to the HIP, and then to it.
+  std::optional<Point> rolledTo(const Point& ball, const ReportedProxy& proxy,
+                                const std::function<bool(const Point&)>& arrives) {
+    const double reach = 2 * (proxy.at - ball).norm() + 400e-6;  // half of which a ball may roll
+    const auto rolled = [&](const Point& from, const Point& goal) {
+      return Descent(reference_, from, reach, kRolling * radius_, ++seed_).from(from, goal, kSteps);
+    };
+    for (int k = 0; k < kRolls; ++k) {
+      Point q = rolled(ball, proxy.at);
+      if (!arrives(q) && proxy.hip) q = rolled(rolled(ball, *proxy.hip), proxy.at);
+      if (arrives(q)) return q;
+    }
+    return std::nullopt;
   }
 
   std::optional<Point> endOf(const Point& ball, const Point& p, bool overlapping, bool& decided) {

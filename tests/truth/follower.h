@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "truth/free_space.h"
@@ -16,7 +17,8 @@ namespace hapticd::truth {
 /// What was reported in a tick.
 struct ReportedProxy {
   Point at = Point::Zero();
-  bool popped = false;  ///< it stepped through a face
+  bool popped = false;                      ///< it stepped through a face
+  std::optional<Point> hip = std::nullopt;  ///< it went towards this
 };
 
 /// Whether a ball of this radius can follow the proxies, one for each tick from the first of the trial, to

@@ -30,6 +30,8 @@ constexpr double kStuck_m = 10e-6;
 constexpr double kDescentReach_m = 1e-3;
 constexpr double kRolling_m = 0.505 * kGap_m;  // of the ball of a point tool, a little wider
 constexpr double kWider_m = 1.2 * kFollower_m;
+constexpr double kFineStep_m = 1e-6;
+constexpr double kFineSlack_m = 2e-11;
 constexpr double kTremor_m = 1e-6;
 constexpr double kFlat = 2e-3;  // share of the pull: flatter directions lead nowhere
 constexpr int kTremorTicks = 10;
@@ -269,7 +271,7 @@ class Referee {
 
   void judgePlaces() {
     const Point& p = rendering_.proxy_m;
-    reported_.push_back({p, (rendering_.status & realtime::kRenderPopthrough) != 0});
+    reported_.push_back({p, (rendering_.status & realtime::kRenderPopthrough) != 0, hip_});
     rounding_ = reference_.rounding();
     if (beyondWalls(p) > kGap_m)
       return report("escaped", beyondWalls(p), " m beyond a wall, proxy ", p.transpose());
@@ -294,6 +296,7 @@ class Referee {
     heightsBefore_.swap(proxyHeights_);
     if (rendering_.contactForce_N.norm() > stiffest_ * kForceTolerance_m + damping_ * velocity_.norm())
       judgeFreeForce();
+    if (rendering_.touching) touchedAt_ = p;
   }
 
   // A HIP that is free within the ball of the point tool: where the work of the tick ends, the report is
@@ -326,7 +329,17 @@ class Referee {
       return std::none_of(space.faces().begin(), space.faces().end(),
                           [&](int i) { return reference_.crosses(i, proxyBefore_, q, 0); });
     };
-    return !space.placeNear(proxyBefore_, visible);
+    return !space.placeNear(proxyBefore_, visible) || remainedInSlit();
+  }
+
+  // Where there is room beside the HIP, but the slit narrows towards it: from its last place in contact, the
+  // ball does not get to the free HIP, and it is there, or nearer, when it is reported again.
+  bool remainedInSlit() const {
+    Descent descent(reference_, touchedAt_, 2 * (proxyBefore_ - touchedAt_).norm() + 400e-6, kRolling_m,
+                    trial_.seed);
+    const Point ball = descent.from(touchedAt_, proxyBefore_, 200);
+    return (ball - proxyBefore_).norm() > kWedge_m &&
+           (rendering_.proxy_m - hip_).norm() < (ball - hip_).norm() + kWedge_m;
   }
 
   // A move is suspected when it goes through a face, or past its edge nearer than any gap is wide.
@@ -822,6 +835,10 @@ class Referee {
                     trial_.seed + static_cast<std::uint64_t>(tick_));
     const Point place = descent.from(ball, rendering_.proxy_m);
     better = descent.from(place, hip_);
+    // Where a face begins below a nanometre above the one that the ball is on, its edge holds the ball; long
+    // steps jump over it.
+    Descent fine(reference_, place, kDescentReach_m, radius, trial_.seed, kFineSlack_m);
+    if ((fine.from(place, hip_, 4, kFineStep_m) - place).norm() < 0.01 * kFineStep_m) return false;
     const double unknown = trial_.toolRadius_m > 0 ? 2e-3 * radius : kGap_m;
     return (place - hip_).norm() - (better - hip_).norm() > kStuck_m + unknown;
   }
@@ -872,6 +889,7 @@ class Referee {
   Point hipBefore_ = Point::Zero();
   Point velocity_ = Point::Zero();
   Point proxyBefore_ = Point::Zero();
+  Point touchedAt_ = Point::Zero();  // by the proxy, last
   Point forceBefore_ = Point::Zero();
   double work_J_ = 0;
   double shareBefore_ = 1;
