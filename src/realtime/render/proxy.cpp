@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -286,6 +287,7 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
   // Allows for a proxy within the skin, which the first approach moves outwards.
   double nearest = (position_ - target).norm() + 4 * skin;
   Vec3 step = Vec3::Zero();
+  bool first = true;
   bool escaped = false;      // the last step was out of a corner
   Vec3 turn = Vec3::Zero();  // the nearest place from which no approach came nearer
   std::optional<ActiveSet> turnHeld;
@@ -302,6 +304,8 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     Vec3 goal;
     if (approach(target, false, active, goal)) return false;
     double distance = (position_ - target).norm();
+    // Out of a face that moved or deformed into it: the place before was nearer, and not free.
+    if (std::exchange(first, false) && distance > nearest) nearest = std::numeric_limits<double>::infinity();
     // Where it did not move, the next approach would be the same.
     if (!(distance < nearest - gain) || (position_ - from).norm() <= kAtRest * skin) {
       if (held) {
