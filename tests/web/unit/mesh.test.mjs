@@ -103,6 +103,37 @@ test("OBJ, STL, PLY and glTF give the same square; images of a glTF are not fetc
   }
 });
 
+test("OBJ as programs write it", async () => {
+  const text =
+    "# v 1 2 3\nmtllib C:\\part\\\n  v .0 0 0 1\r\nv 2,0 0. +0 0.5 0.5 0.5\r\nv 2 \\\n 2 -0e3 # f 1 2\no f 1 2 3\n" +
+    "v\t0\t2\t0\nvt 0 0\nf 1/1 2//1 \\\n -2 4 # \\\nl 1 2\nf 1 2\n";
+  const { mesh } = await readMesh([file("a.obj", text)]);
+  assert.deepEqual(sorted(mesh), sorted(weld(Float32Array.from(SQUARE))));
+});
+
+test("a face of OBJ with notches, corners in a row or a hole is covered once", async () => {
+  const comb = [[0, 0], [3, 0], [3, 2], [2.5, 0.2], [2, 2], [1.5, 0.2], [1, 2], [0.5, 0.2], [0, 2]];
+  const row = [[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]];
+  const hole = [[-2, -2], [-1, -1], [-1, 1], [1, 1], [1, -1], [-1, -1], [-2, -2], [2, -2], [2, 2], [-2, 2]];
+  for (const [face, area] of [[comb, 3.3], [row, 2], [hole, 12]]) {
+    for (let first = 0; first < face.length; ++first) {
+      const turned = [...face.slice(first), ...face.slice(0, first)];
+      const obj = `${turned.map(([x, y]) => `v ${x} 7 ${-y}\n`).join("")}f ${turned.map((_, i) => i + 1).join(" ")}\n`;
+      const { mesh } = await readMesh([file("a.obj", obj)]);
+      let along = 0;
+      let all = 0;
+      for (let i = 0; i < mesh.triangles.length; i += 3) {
+        const [a, b, c] = [0, 1, 2].map((k) => mesh.positions.subarray(3 * mesh.triangles[i + k]));
+        const twice = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]); // upwards
+        along += twice / 2;
+        all += Math.abs(twice) / 2;
+      }
+      assert.equal(mesh.triangles.length, 3 * (face.length - 2));
+      assert.ok(Math.abs(along - area) < 1e-5 && Math.abs(all - area) < 1e-5, `${area}: ${along}, ${all}`);
+    }
+  }
+});
+
 test("errors name the file and the reason", async () => {
   const wrong = [
     [[file("notes.txt", "hello")], /notes\.txt is not a mesh file: drop an OBJ/],
@@ -112,8 +143,10 @@ test("errors name the file and the reason", async () => {
       /points\.ply: no triangles/,
     ],
     [[file("short.stl", "x".repeat(100))], /short\.stl: the file is truncated, or not a valid STL file/],
-    [[file("index.obj", OBJ.replace("f 1 2 3", "f 1 2 9"))], /refers to a vertex that the file does not have/],
-    [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 0 is not finite/],
+    [[file("index.obj", OBJ.replace("f 1 2 3", "f 1 2 9"))], /index\.obj: line 5: a face has the corner 9, but there are 4 vertices/],
+    [[file("short.obj", OBJ.replace("2 2 0", "2 2"))], /short\.obj: line 3: a vertex has 2 coordinates, expected 3/],
+    [[file("word.obj", OBJ.replace("2 2 0", "2 2 0;"))], /word\.obj: line 3: '0;' is no number/],
+    [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 1 is not finite/],
     [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
     [[file("cut.glb", "{")], /cut\.glb: /],
   ];

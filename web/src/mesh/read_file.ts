@@ -1,11 +1,11 @@
-// Reads a mesh from an OBJ, STL, PLY or glTF file with three's loaders, in the browser.
+// Reads a mesh from an OBJ, STL, PLY or glTF file in the browser, all but OBJ with three's loaders.
 import { type BufferGeometry, Mesh, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { shapeOf } from "./gltf_shape";
 import { isMeshFile, kindOf } from "./mesh_files";
+import { cornersOfObj } from "./obj_file";
 import { largePolygons } from "./ply_polygons";
 import { type FileMesh, weld } from "./weld";
 
@@ -37,7 +37,7 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
   const bytes = await file.arrayBuffer();
   switch (kindOf(file.name)) {
     case "obj":
-      return cornersIn(new OBJLoader().parse(new TextDecoder().decode(bytes)));
+      return cornersOfObj(new TextDecoder().decode(bytes));
     case "stl":
       return cornersIn(new Mesh(new STLLoader().parse(bytes)));
     case "ply": {
