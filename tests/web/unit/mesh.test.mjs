@@ -147,6 +147,8 @@ test("errors name the file and the reason", async () => {
     [[file("short.obj", OBJ.replace("2 2 0", "2 2"))], /short\.obj: line 3: a vertex has 2 coordinates, expected 3/],
     [[file("word.obj", OBJ.replace("2 2 0", "2 2 0;"))], /word\.obj: line 3: '0;' is no number/],
     [[file("bad.obj", OBJ.replace("2 2 0", "2 nan 0"))], /bad\.obj: a corner of triangle 1 is not finite/],
+    [[file("index.ply", PLY.replace("3 0 2 3", "3 0 2 4"))], /index\.ply: a face has the corner 4, but there are 4 vertices/],
+    [[file("early.ply", PLY.replace(/ 3\n$/, ""))], /early\.ply: the file is truncated/],
     [[file("cut.stl", Buffer.alloc(40))], /cut\.stl: /],
     [[file("cut.glb", "{")], /cut\.glb: /],
   ];
@@ -183,16 +185,16 @@ function polygons(format, corners) {
   ]);
 }
 
-test("a PLY file with polygons is refused instead of losing them; quads are read", async () => {
+test("polygons and strips of a PLY file are divided", async () => {
   for (const format of ["ascii", "binary_little_endian", "binary_big_endian"]) {
-    await assert.rejects(
-      readMesh([file("pentagon.ply", polygons(format, 5))]),
-      { message: /pentagon\.ply: 1 of its faces have more than 4 corners: split them/ },
-      format,
-    );
-    const { mesh } = await readMesh([file("quads.ply", polygons(format, 4))]);
-    assert.equal(mesh.triangles.length, 12, format);
+    for (const [corners, triangles] of [[5, 5], [4, 4], [3, 3]]) {
+      const { mesh } = await readMesh([file("polygons.ply", polygons(format, corners))]);
+      assert.equal(mesh.triangles.length, 3 * triangles, format);
+    }
   }
+  const strips = PLY.replace("element face 2", "element tristrips 1").replace(/3 0 1 2\n3 0 2 3\n/, "7 1 2 0 3 -1 0 0\n");
+  const { mesh } = await readMesh([file("strips.ply", strips)]);
+  assert.deepEqual(sorted(mesh), sorted(weld(Float32Array.from(SQUARE))));
 });
 
 test("decodes the server's mesh; a truncated one is an error", () => {

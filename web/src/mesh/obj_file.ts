@@ -1,6 +1,6 @@
 // OBJ as the server's commands read it (src/mesh_io/obj_file.cpp). three's loader divides faces by fans, which cover more than a
 // face with notches, and takes comments for corners.
-import { divide } from "./triangulation";
+import { cornersOfFaces } from "./triangulation";
 
 /** The corners of all triangles. The error names the line and the reason. */
 export function cornersOfObj(text: string): Float32Array {
@@ -34,14 +34,7 @@ export function cornersOfObj(text: string): Float32Array {
   }
   if (last.index >= positions.length / 3)
     throw new Error(`line ${last.line}: a face has the corner ${last.index + 1}, but there are ${positions.length / 3} vertices`);
-  const triangles: number[] = [];
-  let begin = 0;
-  for (const size of sizes) divide(faces.slice(begin, (begin += size)), positions, triangles);
-  const corners = new Float32Array(3 * triangles.length);
-  triangles.forEach((vertex, at) => {
-    for (let axis = 0; axis < 3; ++axis) corners[3 * at + axis] = positions[3 * vertex + axis]!;
-  });
-  return corners;
+  return cornersOfFaces(positions, faces, sizes);
 }
 
 // A comment begins at a word.

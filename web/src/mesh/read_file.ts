@@ -1,12 +1,11 @@
-// Reads a mesh from an OBJ, STL, PLY or glTF file in the browser, all but OBJ with three's loaders.
+// Reads a mesh from an OBJ, PLY, STL or glTF file in the browser; the last two with three's loaders.
 import { type BufferGeometry, Mesh, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { shapeOf } from "./gltf_shape";
 import { isMeshFile, kindOf } from "./mesh_files";
 import { cornersOfObj } from "./obj_file";
-import { largePolygons } from "./ply_polygons";
+import { cornersOfPly } from "./ply_file";
 import { type FileMesh, weld } from "./weld";
 
 /** The limit of one batch in the server. */
@@ -40,16 +39,8 @@ async function cornersOf(file: File, files: File[]): Promise<Float32Array> {
       return cornersOfObj(new TextDecoder().decode(bytes));
     case "stl":
       return cornersIn(new Mesh(new STLLoader().parse(bytes)));
-    case "ply": {
-      const large = largePolygons(bytes); // first: it refuses counts that three's loader would count up to
-      if (large > 0)
-        throw new Error(
-          `${large} of its faces have more than 4 corners: split them into triangles first, or load the file with 'hapticd touch'`,
-        );
-      const geometry = new PLYLoader().parse(bytes);
-      // Without faces it is a point cloud, not a list of corners.
-      return geometry.index ? cornersIn(new Mesh(geometry)) : new Float32Array(0);
-    }
+    case "ply":
+      return cornersOfPly(bytes);
     default: {
       const shape = await shapeOf(bytes, (name) => files.find((f) => f.name === name)?.arrayBuffer());
       return cornersIn((await new GLTFLoader().parseAsync(shape, "")).scene);

@@ -1,7 +1,19 @@
 // Polygons into triangles without holes, as the server's commands divide them (src/mesh_io/triangulation.cpp).
 
+/** The corners of the triangles of all faces. `corners` has those of one face after the other, as numbers of positions. */
+export function cornersOfFaces(positions: readonly number[], corners: readonly number[], sizes: readonly number[]): Float32Array {
+  const triangles: number[] = [];
+  let begin = 0;
+  for (const size of sizes) divide(corners.slice(begin, (begin += size)), positions, triangles);
+  const out = new Float32Array(3 * triangles.length);
+  triangles.forEach((vertex, at) => {
+    for (let axis = 0; axis < 3; ++axis) out[3 * at + axis] = positions[3 * vertex + axis]!;
+  });
+  return out;
+}
+
 /** Appends the n - 2 triangles of a face of n corners. All are numbers of positions, which have three coordinates each. */
-export function divide(face: readonly number[], positions: readonly number[], triangles: number[]): void {
+function divide(face: readonly number[], positions: readonly number[], triangles: number[]): void {
   if (face.length < 3) return;
   if (face.length === 3) {
     triangles.push(...face);
