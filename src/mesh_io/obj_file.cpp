@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace hapticd::mesh_io {
 namespace {
