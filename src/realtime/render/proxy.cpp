@@ -304,8 +304,10 @@ bool Proxy::moveFrictionless(const Vec3& target, ActiveSet& active) noexcept {
     Vec3 goal;
     if (approach(target, false, active, goal)) return false;
     double distance = (position_ - target).norm();
-    // Out of a face that moved or deformed into it: the place before was nearer, and not free.
-    if (std::exchange(first, false) && distance > nearest) nearest = std::numeric_limits<double>::infinity();
+    // Out of a face that moved or deformed into it: the place before was nearer, and not free. Among faces at
+    // rest it is a jam, in which more approaches would only spend the work of the tick.
+    if (std::exchange(first, false) && distance > nearest && !query_.allAtRest())
+      nearest = std::numeric_limits<double>::infinity();
     // Where it did not move, the next approach would be the same.
     if (!(distance < nearest - gain) || (position_ - from).norm() <= kAtRest * skin) {
       if (held) {
