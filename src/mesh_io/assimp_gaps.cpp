@@ -94,7 +94,7 @@ bool isUtf16(std::string_view head) {
 
 }  // namespace
 
-void refuseWhatAssimpMisreads(Assimp::IOStream& file, const std::string& format) {
+void refuseUnreadable(Assimp::IOStream& file, const std::string& format) {
   constexpr std::size_t kGlbHeader = 20;
   const std::string head = readNext(file, kGlbHeader);
   if (isUtf16(head)) refuse("it is a text in UTF-16: save it in UTF-8");

@@ -10,7 +10,7 @@ namespace hapticd::mesh_io {
 
 /// Throws std::runtime_error for a text in UTF-16, for glTF 1 in one file, and for a glTF that requires an
 /// extension of meshes which Assimp ignores.
-void refuseWhatAssimpMisreads(Assimp::IOStream& file, const std::string& format);
+void refuseUnreadable(Assimp::IOStream& file, const std::string& format);
 
 /// The file without a byte order mark before its text, without bytes after the last triangle of a binary STL,
 /// and in lower case where an STL is in upper case.

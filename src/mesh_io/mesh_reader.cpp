@@ -13,7 +13,6 @@
 #include <assimp/LogStream.hpp>
 #include <memory>
 #include <new>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -111,11 +110,8 @@ void keepOnly(Assimp::Importer& importer, const std::string& format) {
 }
 
 void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_node) {
-  if (all.vertices.size() + part.mNumVertices > kLargestMesh ||
-      all.triangles.size() + part.mNumFaces > kLargestMesh) {
-    throw std::runtime_error("it has more than " + std::to_string(kLargestMesh) +
-                             " triangles or vertices: reduce it");
-  }
+  requireRoom(all.vertices.size() + part.mNumVertices);
+  requireRoom(all.triangles.size() + part.mNumFaces);
   const auto first = static_cast<std::uint32_t>(all.vertices.size());
   for (unsigned i = 0; i < part.mNumVertices; ++i) {
     const aiVector3D v = T_file_node * part.mVertices[i];
@@ -128,7 +124,7 @@ void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_nod
     if (face.mNumIndices != 3) continue;  // a point or a line
     // A corner that this part does not have would be a vertex of the next part.
     if (std::any_of(face.mIndices, face.mIndices + 3, [&](unsigned c) { return c >= part.mNumVertices; }))
-      throw std::runtime_error(kNoSuchCorner);
+      refuse(kNoSuchCorner);
     Triangle t{first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]};
     if (mirrored) std::swap(t[1], t[2]);
     all.triangles.push_back(t);
@@ -138,11 +134,10 @@ void append(TriangleMesh& all, const aiMesh& part, const aiMatrix4x4& T_file_nod
 void appendNode(TriangleMesh& all, const aiScene& scene, const aiNode& node, const aiMatrix4x4& T_file_parent,
                 int depth) {
   if (depth > kDeepestNode)
-    throw std::runtime_error("its nodes are nested more than " + std::to_string(kDeepestNode) + " deep");
+    refuse("its nodes are nested more than " + std::to_string(kDeepestNode) + " deep");
   const aiMatrix4x4 T_file_node = T_file_parent * node.mTransformation;
   for (unsigned i = 0; i < node.mNumMeshes; ++i) {
-    if (node.mMeshes[i] >= scene.mNumMeshes)
-      throw std::runtime_error("a node has a mesh that does not exist");
+    if (node.mMeshes[i] >= scene.mNumMeshes) refuse("a node has a mesh that does not exist");
     append(all, *scene.mMeshes[node.mMeshes[i]], T_file_node);
   }
   for (unsigned i = 0; i < node.mNumChildren; ++i)
@@ -152,7 +147,7 @@ void appendNode(TriangleMesh& all, const aiScene& scene, const aiNode& node, con
 // Assimp names its own parts where a file has no triangles, or another format.
 std::string explained(const std::string& reason, const std::string& format) {
   const auto names = [&](std::string_view text) { return reason.find(text) != std::string::npos; };
-  if (names("OBJ-file is too small") || names("File is empty")) return "it holds no triangles";
+  if (names("File is empty")) return "it holds no triangles";
   if (names("No suitable reader") || names("Failed to determine STL"))
     return "it is not a ." + format + " file";
   return reason.empty() ? "it cannot be read" : reason;
@@ -173,9 +168,9 @@ TriangleMesh throughAssimp(const std::filesystem::path& file, const std::string&
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string reason = importer.GetErrorString();
     if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-    throw std::runtime_error(explained(reason, format));
+    refuse(explained(reason, format));
   }
-  if (dropped.any()) throw std::runtime_error(kNoSuchCorner);
+  if (dropped.any()) refuse(kNoSuchCorner);
   TriangleMesh mesh;
   appendNode(mesh, *scene, *scene->mRootNode, aiMatrix4x4(), 0);
   return mesh;
@@ -190,8 +185,8 @@ bool isSupported(const std::filesystem::path& file) {
 TriangleMesh readMesh(const std::filesystem::path& file) {
   const std::string format = formatOf(file);
   const std::unique_ptr<Assimp::IOStream> content(OnlyGeometry(file).Open(file.c_str(), "rb"));
-  if (!content) throw std::runtime_error("it cannot be read");
-  refuseWhatAssimpMisreads(*content, format);
+  if (!content) refuse("it cannot be read");
+  refuseUnreadable(*content, format);
   TriangleMesh mesh;
   if (Parse* const parse = parserOf(format)) {
     content->Seek(0, aiOrigin_SET);
@@ -201,7 +196,7 @@ TriangleMesh readMesh(const std::filesystem::path& file) {
   } else {
     mesh = throughAssimp(file, format);
   }
-  if (mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
+  if (mesh.triangles.empty()) refuse("it holds no triangles");
   geometry::weld(mesh);
   return mesh;
 }

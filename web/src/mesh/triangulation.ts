@@ -4,7 +4,10 @@
 export function cornersOfFaces(positions: readonly number[], corners: readonly number[], sizes: readonly number[]): Float32Array {
   const triangles: number[] = [];
   let begin = 0;
-  for (const size of sizes) divide(corners.slice(begin, (begin += size)), positions, triangles);
+  for (const size of sizes) {
+    divide(corners.slice(begin, begin + size), positions, triangles);
+    begin += size;
+  }
   const out = new Float32Array(3 * triangles.length);
   triangles.forEach((vertex, at) => {
     for (let axis = 0; axis < 3; ++axis) out[3 * at + axis] = positions[3 * vertex + axis]!;
