@@ -9,6 +9,10 @@ namespace {
 
 constexpr double kShortest_m = 2e-8;  // a shorter way leads nowhere
 constexpr int kRollSteps = 64;
+// In slacks, how far a step may rise above its start, and above its lowest place: a ball that is pushed out
+// of several faces is not moved evenly.
+constexpr double kClimb = 0.5;
+constexpr double kUneven = 10;
 constexpr std::size_t kGrooves = 4;  // of this many faces
 
 }  // namespace
@@ -55,11 +59,14 @@ bool Descent::pushedOut(Point& x) const {
 // over.
 bool Descent::rolls(const Point& x, const Point& end, const Point& goal) const {
   Point before = x;
+  double lowest = (goal - x).norm();
   for (int k = 1; k <= kRollSteps; ++k) {
     Point next = x + static_cast<double>(k) / kRollSteps * (end - x);
     if (!pushedOut(next) || !passesNone(before, next)) return false;
     if ((next - before).norm() > 2 * (end - x).norm() / kRollSteps) return false;
-    if ((goal - next).norm() > (goal - x).norm() + 0.5 * slack_) return false;
+    const double height = (goal - next).norm();
+    if (height > std::min((goal - x).norm() + kClimb * slack_, lowest + kUneven * slack_)) return false;
+    lowest = std::min(lowest, height);
     before = next;
   }
   return true;

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "realtime/render/renderer.h"
+#include "truth/descent.h"
 #include "truth/follower.h"
 #include "truth/free_space.h"
 #include "truth/meshes.h"
@@ -112,6 +113,33 @@ TEST(Reference, carries_points_with_a_turning_object) {
   reference.moveTo(20);
   reference.moveTo(21);
   EXPECT_FALSE(reference.moved());
+}
+
+// A ditch across the way down holds a ball that rolls by hand, though the way before it fell by more than its
+// far side rises.
+double rolledTo(double rise) {
+  Trial trial;
+  TrialObject& ditch = trial.objects.emplace_back();
+  const std::array<Point, 4> section{Point(-400e-6, 0, 40e-6), Point(0, 0, 0), Point(30e-6, 0, rise),
+                                     Point(900e-6, 0, rise - 90e-6)};
+  for (const Point& p : section) {
+    for (const double side : {-1e-3, 1e-3})
+      ditch.vertices.push_back((p + side * Point::UnitY()).cast<float>());
+  }
+  for (std::uint32_t i = 0; i < 6; i += 2) {
+    ditch.triangles.push_back({i, i + 2, i + 1});
+    ditch.triangles.push_back({i + 1, i + 2, i + 3});
+  }
+  Reference reference(trial);
+  reference.moveTo(0);
+  const Point start(-100e-6, 0, 16e-6);
+  Descent descent(reference, start, 1e-3, 5e-6, 1);
+  return descent.from(start, {400e-6, 0, -20e-3}).x();
+}
+
+TEST(Descent, rolls_into_a_ditch_and_not_out) {
+  EXPECT_NEAR(rolledTo(1.5e-6), 0, 5e-6);
+  EXPECT_GT(rolledTo(-3e-6), 200e-6);
 }
 
 TEST(Trial, text_gives_the_same_trial) {
