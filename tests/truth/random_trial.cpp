@@ -50,6 +50,7 @@ class Maker {
     if (kind == "needles") makeNeedles();
     if (kind == "fan") makeFan();
     if (kind == "joined") makeJoinedFan();
+    if (kind == "valleys") makeValleys();
     if (kind == "sheets") makeSheets();
     if (kind == "nested") makeNested();
     if (kind == "bumps")
@@ -149,6 +150,20 @@ class Maker {
   // judge: only on request.
   void makeJoinedFan() {
     shapes_.push_back(fan(dice_.integer(256, 1200), kHalf_m, dice_.uniform(-0.02, 0.02)));
+  }
+
+  // Pits, ridges and narrow valleys, where three faces hold the proxy and one of them ends. Only on request, so
+  // that seeds of the other kinds give the scenes that they always gave.
+  void makeValleys() {
+    if (dice_.chance(0.5)) {
+      shapes_.push_back(sphere(dice_.integer(2, 5), 0.014, dice_.uniform(0.2, 0.6), dice_));
+      return;
+    }
+    const int cells = dice_.integer(3, 9);
+    const double relief = dice_.uniform(0.2, 2) * kHalf_m / cells;
+    Shape ground = bumps(cells, kHalf_m, 0, 0.35, dice_);
+    for (Point& p : ground.vertices) p.z() += dice_.uniform(-relief, relief);
+    shapes_.push_back(ground);
   }
 
   // Copies of one sheet, at most a little apart, and a sheet that crosses them.
