@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/printable.h"
 #include "record/crc32.h"
 
 namespace hapticd::record {
@@ -74,11 +75,14 @@ std::uint16_t McapWriter::addSchema(std::string_view name, std::string_view json
 
 std::uint16_t McapWriter::addChannel(std::uint16_t schema, std::string_view topic) {
   constexpr std::uint32_t kNoMetadata = 0;
-  const Bytes record =
-      Out()
-          .record(kChannel,
-                  Out().number(++channels_).number(schema).text(topic).text("json").number(kNoMetadata))
-          .bytes;
+  const Bytes record = Out()
+                           .record(kChannel, Out()
+                                                 .number(++channels_)
+                                                 .number(schema)
+                                                 .text(base::utf8(topic))
+                                                 .text("json")
+                                                 .number(kNoMetadata))
+                           .bytes;
   definitions_.insert(definitions_.end(), record.begin(), record.end());
   chunk_.insert(chunk_.end(), record.begin(), record.end());
   counts_[channels_] = 0;

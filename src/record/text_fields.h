@@ -45,7 +45,7 @@ inline void appendQuoted(std::string& out, std::string_view text) {
 }
 
 /// One row of CSV: vectors take a column per coordinate, trips are names joined by "+", and absent values
-/// leave their columns empty. The one writer of CSV.
+/// leave their columns empty. Text is made UTF-8. The one writer of CSV.
 class CsvRow {
  public:
   explicit CsvRow(std::string& out) : out_(out) {}
@@ -64,8 +64,9 @@ class CsvRow {
   void put(bool value) { put(std::uint8_t{value}); }
   void put(Trips trips) { put(namesOf(trips)); }
   void put(ExactNanos time) { put(time.value); }
-  void put(const std::string& text) {
+  void put(const std::string& bytes) {
     separate();
+    const std::string text = base::utf8(bytes);
     if (text.find_first_of(",\"\r\n") == std::string::npos) {
       out_ += text;
       return;

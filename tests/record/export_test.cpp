@@ -139,6 +139,30 @@ TEST(ExportFile, AFullDiskKeepsTheFileThatWasToBeReplaced) {
   EXPECT_EQ(world.files.list("/"), std::vector<std::string>{"my.csv"});
 }
 
+// Of a vrpn.cfg in Latin-1. Readers of CSV and MCAP refuse a whole file for such a byte.
+TEST(Export, NamesThatAreNotUtf8AreMadeSo) {
+  Sample sample;
+  sample.device =
+      "Gr\xf6\xdf"
+      "e";
+  RecordingFile file;
+  CsvFile csv(file.path());
+  csv.add(sample);
+  csv.close();
+  RecordingFile other;
+  McapFile mcap(other.path());
+  mcap.add(sample);
+  mcap.close();
+  const std::string rows = textOf(file.path());
+  const std::string name =
+      "Gr\xef\xbf\xbd\xef\xbf\xbd"
+      "e";
+  EXPECT_EQ(rows.substr(rows.find('\n') + 1, name.size() + 1), name + ",");
+  const std::string messages = textOf(other.path());
+  EXPECT_NE(messages.find("/" + name + "/tick"), std::string::npos);
+  EXPECT_EQ(messages.find("\xf6\xdf"), std::string::npos);
+}
+
 TEST(Json, BytesThatAreNotUtf8AreReplaced) {
   std::string text;
   {

@@ -1,11 +1,15 @@
 #include "device/replay/replay_device.h"
 
+#include <cstdio>
+
 #include "base/time.h"
 
 namespace hapticd::device {
 
 void ReplayDevice::open() {
   hand_ = HandFile::load(options_.file);
+  if (!hand_->remark().empty())
+    std::fprintf(stderr, "%s: %s\n", options_.file.c_str(), hand_->remark().c_str());
   started_ = false;
 }
 

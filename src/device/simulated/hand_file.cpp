@@ -6,6 +6,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "base/printable.h"
 #include "base/time.h"
 
 namespace hapticd::device {
@@ -16,15 +17,17 @@ constexpr double kLongest_s = 1e8;
 constexpr double kFarthest_m = 1e6;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
-// The cells of a row, trimmed. Commas in quotes do not separate; quotes stay.
+// The cells of a row, trimmed and without quotes around them. Commas in quotes do not separate.
 void split(std::string_view text, std::vector<std::string_view>& cells) {
   cells.clear();
-  bool quoted = false;
+  bool inQuotes = false;
   std::size_t begin = 0;
   for (std::size_t i = 0; i <= text.size(); ++i) {
-    if (i < text.size() && text[i] == '"') quoted = !quoted;
-    if (i < text.size() && (text[i] != ',' || quoted)) continue;
-    cells.push_back(trimmed(text.substr(begin, i - begin)));
+    if (i < text.size() && text[i] == '"') inQuotes = !inQuotes;
+    if (i < text.size() && (text[i] != ',' || inQuotes)) continue;
+    std::string_view cell = trimmed(text.substr(begin, i - begin));
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
+    cells.push_back(cell);
     begin = i + 1;
   }
 }
@@ -83,8 +86,8 @@ Columns named(const std::vector<std::string_view>& names, std::string_view text,
     if (columns.position != kAbsent) break;
   }
   if (columns.time == kAbsent || columns.position == kAbsent) {
-    line.fail("header '" + std::string(text) +
-              "' is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns "
+    line.fail("header " + quoted(text) +
+              " is not t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns "
               "time_ns,hip_x_m,hip_y_m,hip_z_m");
   }
   columns.orientation = findAll<4>(names, {"qx", "qy", "qz", "qw"});
@@ -104,7 +107,7 @@ Nanos readNanos(std::string_view text, std::size_t column, const TextLine& line)
   Nanos value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
-    line.fail("column " + std::to_string(column + 1) + " '" + std::string(text) + "' is not a whole number");
+    line.fail("column " + std::to_string(column + 1) + " " + quoted(text) + " is not a whole number");
   return value;
 }
 
@@ -139,7 +142,14 @@ class HandFile::Parser {
 
   void add(std::string_view content, std::size_t number) {
     const TextLine line{source_, number};
+    if (isBinary(content))
+      line.fail(
+          "holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' makes it "
+          "of "
+          "a recording");
     split(content, cells_);
+    if (cells_.size() < 4 && content.find_first_of(";\t") != std::string_view::npos)
+      line.fail("columns end at commas, and numbers have a decimal point, got " + quoted(content));
     if (columns_.count == 0 && !startsLikeANumber(content)) {
       columns_ = named(cells_, content, line);
       return;
@@ -153,11 +163,12 @@ class HandFile::Parser {
   }
 
   std::string remark() const {
-    std::string text = columns_.remark;
-    if (otherDevices_) {
-      text += (text.empty() ? "" : "; ");
-      text += "holds several devices, only the first is used: " + device_;
-    }
+    std::string text;
+    const auto add = [&](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };
+    if (!columns_.remark.empty()) add(columns_.remark);
+    if (otherDevices_) add("holds several devices, only the first is used: " + base::printable(device_));
+    if (skipped_ > 0)
+      add("skips " + std::to_string(skipped_) + " row(s) whose time is not after that of a row before");
     return text;
   }
 
@@ -177,8 +188,8 @@ class HandFile::Parser {
   double coordinate(std::size_t column, const TextLine& line) const {
     const double value_m = number(column, line);
     if (std::abs(value_m) > kFarthest_m) {
-      line.fail("column " + std::to_string(column + 1) + " '" + std::string(cells_[column]) +
-                "' is a position beyond 1e6 m");
+      line.fail("column " + std::to_string(column + 1) + " " + quoted(cells_[column]) +
+                " is a position beyond 1e6 m");
     }
     return value_m;
   }
@@ -190,10 +201,13 @@ class HandFile::Parser {
     if (duration_s > kLongest_s)
       line.fail("time " + std::to_string(base::toSeconds(time)) +
                 " s is more than 1e8 s after the first row");
-    if (duration_s < -kLongest_s) return;
+    // A client may write a report twice, or a late one after its successor; the wall clock may be set back.
+    if (columns_.fromFirstRow && !hand_.rows_.empty() &&
+        (duration_s < -kLongest_s || time - hand_.origin_ <= hand_.rows_.back().time)) {
+      ++skipped_;
+      return;
+    }
     time -= hand_.origin_;
-    // A client may write a report twice, or a late one after its successor.
-    if (columns_.fromFirstRow && !hand_.rows_.empty() && time <= hand_.rows_.back().time) return;
     if (!hand_.rows_.empty() && time <= hand_.rows_.back().time)
       line.fail("time " + std::to_string(base::toSeconds(time)) + " s is not after the row before");
     const std::size_t x = columns_.position;
@@ -213,6 +227,7 @@ class HandFile::Parser {
   std::vector<std::string_view> cells_;
   std::string device_;
   bool otherDevices_ = false;
+  std::size_t skipped_ = 0;
 };
 
 std::shared_ptr<const HandFile> HandFile::load(const std::filesystem::path& file,

@@ -16,7 +16,8 @@ namespace hapticd::device {
 
 /// Interpolates positions linearly and orientations by slerp; buttons stay until the next row. Before the
 /// first row and after the last one the hand rests. With time_ns the hand begins at the first row, and rows
-/// that repeat or precede their predecessor are ignored. A trajectory begins at its first sample.
+/// that repeat or precede their predecessor are skipped with a remark. A trajectory begins at its first
+/// sample.
 class HandFile final : public HandPath {
  public:
   /// `format` is for trajectories. Throws HandFileError.

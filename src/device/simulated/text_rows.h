@@ -28,6 +28,12 @@ std::string_view trimmed(std::string_view text) noexcept;
 
 bool startsLikeANumber(std::string_view text) noexcept;
 
+/// Control characters, which text has none of but tabs.
+bool isBinary(std::string_view line) noexcept;
+
+/// A value of the file in quotes, for errors: its beginning, as one line.
+std::string quoted(std::string_view value);
+
 /// `column` counts from 0 and is only for the error. Throws HandFileError.
 double readNumber(std::string_view text, std::size_t column, const TextLine& line);
 

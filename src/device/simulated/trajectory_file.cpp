@@ -19,10 +19,6 @@ std::string_view withoutComment(std::string_view text) {
   return trimmed(text.substr(0, std::min({text.find('#'), text.find('%'), text.find("//")})));
 }
 
-bool isBinary(std::string_view text) {
-  return std::any_of(text.begin(), text.end(), [](char c) { return c >= 0 && c < ' ' && c != '\t'; });
-}
-
 // Columns end at a comma, a semicolon, or a run of spaces.
 void splitColumns(std::string_view text, std::vector<std::string_view>& cells) {
   cells.clear();
@@ -39,6 +35,24 @@ void splitColumns(std::string_view text, std::vector<std::string_view>& cells) {
     text.remove_prefix(1);
     skipSpaces();
   }
+}
+
+// Commas between digits and other separators beside them, without a decimal point: "0 1,5 2,5 30,5" would be
+// read as seven columns.
+bool mayHaveDecimalCommas(std::string_view text) {
+  const auto isDigit = [&](std::size_t i) { return text[i] >= '0' && text[i] <= '9'; };
+  const auto isComma = [&](std::size_t i) { return i < text.size() && text[i] == ','; };
+  bool between = false;
+  bool others = false;
+  for (std::size_t i = 1; i + 1 < text.size(); ++i) {
+    if (text[i] == '.') return false;
+    if (isComma(i)) between = between || (isDigit(i - 1) && isDigit(i + 1));
+    if (text[i] == ';') others = true;
+    if (text[i] != ' ' && text[i] != '\t') continue;
+    const std::size_t next = text.find_first_not_of(" \t", i);
+    others = others || !(isComma(next) || isComma(text.find_last_not_of(" \t", i)));
+  }
+  return between && others;
 }
 
 TrajectoryColumns columnsByNumber(std::size_t count, const TextLine& line) {
@@ -70,6 +84,9 @@ class Parser {
       ++headerLines_;
       return;
     }
+    if (mayHaveDecimalCommas(content))
+      line.fail("has commas in numbers or as some of the separators: give " + quoted(content) +
+                " decimal points, or one kind of separator");
     splitColumns(content, cells_);
     if (!columns_) columns_ = columnsByNumber(cells_.size(), line);
     if (cells_.size() != columns_->count) {
@@ -93,7 +110,7 @@ class Parser {
   double number(std::size_t column, double unit, double most, const char* what, const TextLine& line) const {
     const double value = unit * readNumber(cells_[column], column, line);
     if (std::abs(value) > most) {
-      line.fail("column " + std::to_string(column + 1) + " '" + std::string(cells_[column]) + "' is " + what +
+      line.fail("column " + std::to_string(column + 1) + " " + quoted(cells_[column]) + " is " + what +
                 " beyond " + numberOf(most));
     }
     return value;

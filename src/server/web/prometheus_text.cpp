@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/printable.h"
 #include "base/time.h"
 
 namespace hapticd::server {
@@ -47,7 +48,7 @@ void PrometheusText::line(std::string_view ending, double value, Labels labels) 
   (text_ += name_) += ending;
   char before = '{';
   for (const auto& [name, label] : labels) {
-    ((((text_ += before) += name) += "=\"") += escaped(label)) += '"';
+    ((((text_ += before) += name) += "=\"") += escaped(base::utf8(label))) += '"';
     before = ',';
   }
   if (before == ',') text_ += '}';

@@ -50,6 +50,15 @@ TEST_F(ReplayTest, IsWhereTheRecordingSaysWhateverTheForce) {
   EXPECT_TRUE(state.position_m.isZero()) << "open() is a new start";
 }
 
+TEST_F(ReplayTest, SaysWhatItDoesNotUseOfTheFile) {
+  record("time_ns,hip_x_m,hip_y_m,hip_z_m\n20,0,0,0\n10,0,0,0\n30,0,0,0\n");
+  ReplayDevice device(options);
+  testing::internal::CaptureStderr();
+  device.open();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            options.file.string() + ": skips 1 row(s) whose time is not after that of a row before\n");
+}
+
 TEST_F(ReplayTest, Repeats) {
   record("t_s,x_m,y_m,z_m\n0,0,0,0\n0.1,0.1,0,0\n");
   options.repeat = true;

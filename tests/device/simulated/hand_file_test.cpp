@@ -149,7 +149,7 @@ TEST(HandFile, ReadsTheFilesOfOlderVersionsAndRemarksOnIt) {
   EXPECT_EQ(HandFile::parse("t_s,x_m,y_m,z_m\n0,0,0,0\n", "h")->remark(), "");
 }
 
-TEST(HandFile, IgnoresRepeatedAndLateRowsOfARecording) {
+TEST(HandFile, SkipsRepeatedAndLateRowsOfARecordingWithARemark) {
   const auto hand = HandFile::parse(
       "device,time_ns,hip_x_m,hip_y_m,hip_z_m\nA,10,1,0,0\nA,20,2,0,0\nA,20,3,0,0\nA,15,4,0,0\nA,5,5,0,0\nA,"
       "30,6,0,0\n",
@@ -157,6 +157,53 @@ TEST(HandFile, IgnoresRepeatedAndLateRowsOfARecording) {
   EXPECT_EQ(hand->rows(), 3U);
   EXPECT_EQ(hand->duration(), 20);
   EXPECT_EQ(hand->at(20).position_m.x(), 6);
+  EXPECT_EQ(hand->remark(), "skips 3 row(s) whose time is not after that of a row before");
+}
+
+// All that follows a wall clock that was set back by years.
+TEST(HandFile, RemarksOnEachRowThatItSkips) {
+  const auto hand = HandFile::parse(
+      "device,time_ns,hand_x_m,hand_y_m,hand_z_m\nA,1700000000000000000,1,0,0\nB,1700000000000000000,1,0,0\n"
+      "A,1000,2,0,0\nA,2000,3,0,0\n",
+      "h");
+  EXPECT_EQ(hand->rows(), 1U);
+  EXPECT_EQ(hand->remark(),
+            "reads 'time_ns' and 'hand_x_m', columns of an older version of hapticd; holds several devices, "
+            "only the first is used: A; skips 2 row(s) whose time is not after that of a row before");
+}
+
+TEST(HandFile, ReadsQuotesAroundCells) {
+  const auto hand =
+      HandFile::parse("\"\",\"t_s\",\"x_m\",\"y_m\",\"z_m\"\n\"1\",0,1,2,3\n\"2\",\"1\",4,5,6\n", "h");
+  EXPECT_EQ(hand->rows(), 2U);
+  EXPECT_EQ(hand->at(0).position_m, Vec3(1, 2, 3));
+}
+
+TEST(HandFile, SaysHowColumnsAreSeparated) {
+  const std::string how = "hand.csv:1: columns end at commas, and numbers have a decimal point, got ";
+  EXPECT_EQ(errorOf("t_s;x_m;y_m;z_m\n"), how + "'t_s;x_m;y_m;z_m'");
+  EXPECT_EQ(errorOf("0;0;0;0,03\n"), how + "'0;0;0;0,03'");
+  EXPECT_EQ(errorOf("0\t0\t0\t0.03\n"), how + "'0 0 0 0.03'");
+}
+
+// A recording, a text of UTF-16, a value of a megabyte: one line that a terminal can show.
+TEST(HandFile, ShowsNoBytesThatAreNoText) {
+  const std::string binary =
+      ": holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' makes it of "
+      "a "
+      "recording";
+  EXPECT_EQ(errorOf(std::string("HAPTICS\n\0\0\0\1", 12)),
+            "hand.csv:1: header 'HAPTICS' is not t_s,x_m,"
+            "y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns time_ns,hip_x_m,hip_y_m,hip_z_m");
+  EXPECT_EQ(errorOf(std::string("\xff\xfe"
+                                "0\0,\0",
+                                6)),
+            "hand.csv:1" + binary);
+  EXPECT_EQ(errorOf("0,0,0,0\n1,0,\x1b[2J,0\n"), "hand.csv:2" + binary);
+  EXPECT_EQ(errorOf("0,0,0,\xff\n"), "hand.csv:1: column 4 '\xef\xbf\xbd' is not a finite number");
+  const std::string digits(1'000'000, 'x');
+  EXPECT_EQ(errorOf("0,0,0," + digits + "\n"),
+            "hand.csv:1: column 4 '" + digits.substr(0, 200) + "...' is not a finite number");
 }
 
 TEST(HandFile, UsesTheFirstOfSeveralDevices) {

@@ -113,6 +113,19 @@ TEST(Trajectory, NamesFileLineAndValueOfAnError) {
   EXPECT_EQ(refusalOf("a mesh\nof words\n"), "probe.traj: no sample in it; no line begins with a number");
 }
 
+// A whole number and three with decimal commas are no time, position and force.
+TEST(Trajectory, RefusesDecimalCommas) {
+  const auto refusal = [](const std::string& row) {
+    return "probe.traj:2: has commas in numbers or as some of the separators: give '" + row +
+           "' decimal points, or one kind of separator";
+  };
+  for (const std::string row : {"5 1,5 2,5 30,5", "5;1,5;2,5;30,5", "0,5 1,5 2,5 30,5"})
+    EXPECT_EQ(refusalOf("time x y z\n" + row + "\n"), refusal(row));
+  EXPECT_EQ(refusalOf("t\n5\t1,5\t2,5\t30,5\n"), refusal("5 1,5 2,5 30,5"));
+  for (const std::string row : {"5,1,2,3", "5, 1, 2, 3", "5 ,1 ,2 ,3", "5, 1,2 ,3", "5;1;2;3", "0.5 1,2 3"})
+    EXPECT_EQ(refusalOf(row + "\n"), "accepted") << row;
+}
+
 TEST(Trajectory, RefusesTimeThatRunsBack) {
   EXPECT_EQ(refusalOf("5 0 0 0\n5.25 0 0 0\n5.125 0 0 0\n"),
             "probe.traj:3: time 5.125 s is before that of the sample before, 5.25 s");

@@ -31,6 +31,14 @@ TEST(PrometheusText, EscapesLabels) {
   EXPECT_NE(out.text().find("a{device=\"two\\nlines \\\"quoted\\\" \\\\\"} 1\n"), std::string::npos);
 }
 
+// Prometheus refuses all of a server's numbers for one byte that is not UTF-8.
+TEST(PrometheusText, MakesLabelsUtf8) {
+  PrometheusText out;
+  out.family("a", "gauge", "Things.");
+  out.sample(1, {{"device", "Gr\xf6\xc3\xa4"}});
+  EXPECT_NE(out.text().find("a{device=\"Gr\xef\xbf\xbd\xc3\xa4\"} 1\n"), std::string::npos);
+}
+
 TEST(PrometheusText, WritesNonFiniteNumbers) {
   PrometheusText out;
   out.family("a", "gauge", "Things.");
