@@ -9,22 +9,40 @@
 namespace hapticd::realtime {
 namespace {
 
-constexpr int kMostFaces = 1024;     // at a corner, in one tick
-constexpr double kSharp = 0.7;       // cosine of 45 degrees: sharper edges stay edges
+constexpr std::size_t kMostFaces = 1024;  // at a corner, in one tick
+constexpr double kSharp = 0.7;            // cosine of 45 degrees: sharper edges stay edges
 constexpr double kFades_rad = 0.39;  // half of that: between two faces of a sharp edge, the normal as it is
+
+// The triangles near a place, by number: sums over them do not depend on the order of visits, which is the
+// tree's.
+class NearTriangles {
+ public:
+  NearTriangles(const scene::MeshGeometry& mesh, const Vec3& place, double radius, Nanos now) noexcept {
+    mesh.indexAt(now).visitNear(place, radius, [&](std::uint32_t t) noexcept -> bool {
+      if (count_ == faces_.size()) return false;
+      faces_[count_++] = t;
+      return true;
+    });
+    std::sort(faces_.begin(), faces_.begin() + static_cast<std::ptrdiff_t>(count_));
+  }
+  const std::uint32_t* begin() const noexcept { return faces_.data(); }
+  const std::uint32_t* end() const noexcept { return faces_.data() + count_; }
+
+ private:
+  std::array<std::uint32_t, kMostFaces> faces_;
+  std::size_t count_ = 0;
+};
 
 // Mean normal of the faces that meet at a corner and continue smoothly from the touched one, whose normal is
 // `face`. Corners are identified by position, so that unwelded meshes work.
 Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corner, Nanos now) {
   const scene::MeshGeometry& mesh = *object.state->mesh;
   Vec3 sum = Vec3::Zero();
-  int visits = 0;
-  mesh.indexAt(now).visitNear(corner, 0, [&](std::uint32_t t) noexcept -> bool {
-    if (++visits > kMostFaces) return false;
+  for (const std::uint32_t t : NearTriangles(mesh, corner, 0, now)) {
     const scene::Corners inObject = mesh.corners(t, now);
     const scene::Corners k = object.corners(t, now);
     Facet f;
-    if (!makeFacet(k, object.skin, f) || f.normal.dot(face) < kSharp) return true;
+    if (!makeFacet(k, object.skin, f) || f.normal.dot(face) < kSharp) continue;
     const auto add = [&](const Vec3& place, const Vec3& a, const Vec3& b, const Vec3& c) {
       if (place != corner) return;
       sum += std::acos(std::clamp((b - a).normalized().dot((c - a).normalized()), -1.0, 1.0)) * f.normal;
@@ -33,8 +51,7 @@ Vec3 cornerNormal(const PlacedObject& object, const Vec3& face, const Vec3& corn
     // A mirrored placement swaps the other two corners.
     add(object.mirrored ? inObject.c : inObject.b, k.b, k.c, k.a);
     add(object.mirrored ? inObject.b : inObject.c, k.c, k.a, k.b);
-    return true;
-  });
+  }
   return sum;
 }
 
@@ -64,20 +81,15 @@ struct MeetingFaces {
 
   MeetingFaces(const PlacedObject& object, const Vec3& place, Nanos now) {
     const double near_m = 4 * object.skin;
-    int visits = 0;
-    object.state->mesh->indexAt(now).visitNear(object.T_object_device * place,
-                                               near_m * object.T_object_device.linear().norm(),
-                                               [&](std::uint32_t t) noexcept -> bool {
-                                                 if (++visits > kMostFaces || count == kMost) return false;
-                                                 Facet f;
-                                                 if (!makeFacet(object.corners(t, now), object.skin, f))
-                                                   return true;
-                                                 if ((nearestPointOf(f, place) - place).norm() > near_m)
-                                                   return true;
-                                                 normals[count] = f.normal;
-                                                 triangles[count++] = t;
-                                                 return true;
-                                               });
+    for (const std::uint32_t t : NearTriangles(*object.state->mesh, object.T_object_device * place,
+                                               near_m * object.T_object_device.linear().norm(), now)) {
+      if (count == kMost) break;
+      Facet f;
+      if (!makeFacet(object.corners(t, now), object.skin, f)) continue;
+      if ((nearestPointOf(f, place) - place).norm() > near_m) continue;
+      normals[count] = f.normal;
+      triangles[count++] = t;
+    }
   }
   // The one that lies most across this direction, seen from either side.
   std::size_t across(const Vec3& direction) const {
