@@ -1,9 +1,10 @@
 // Connecting, losing a connection, and the texts of errors.
 #include "client/client_tests.h"
 
-#include <sys/resource.h>
 #include <time.h>
 
+#include <cerrno>
+#include <system_error>
 #include <thread>
 
 #include "net/loop_impl.h"
@@ -157,29 +158,21 @@ TEST(Client, AConnectionThatIsLostBeforeTheDeviceAnswersIsTheCause) {
   EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
 }
 
-/// While it lives, the program gets no new file descriptor.
-class NoDescriptors {
+/// The network of a program that has no file descriptor left.
+class NoDescriptors final : public net::Network {
  public:
-  NoDescriptors() {
-    getrlimit(RLIMIT_NOFILE, &before_);
-    const rlimit none{0, before_.rlim_max};
-    setrlimit(RLIMIT_NOFILE, &none);
+  std::unique_ptr<net::Loop::Impl> makeLoop() override {
+    throw std::system_error(EMFILE, std::system_category());
   }
-  ~NoDescriptors() { setrlimit(RLIMIT_NOFILE, &before_); }
-  NoDescriptors(const NoDescriptors&) = delete;
-  NoDescriptors& operator=(const NoDescriptors&) = delete;
-
- private:
-  rlimit before_{};
+  std::uint32_t resolve(const std::string&) override { return net::kLoopbackAddress; }
+  std::uint32_t localAddressTowards(const std::string&) override { return net::kLoopbackAddress; }
 };
 
 TEST(Client, AProgramWithoutAFreeDescriptorIsToldSo) {
-  std::string text;
-  {
-    const NoDescriptors none;
-    text = textOf<ConnectError>([] { Client("Phantom@tcp://127.0.0.1:1"); });
-  }
-  EXPECT_THAT(text, HasSubstr("127.0.0.1:1: "));
+  NoDescriptors none;
+  const net::ScopedNetwork scope(none);
+  const std::string text = textOf<ConnectError>([] { Client("Phantom@tcp://127.0.0.1:1"); });
+  EXPECT_THAT(text, HasSubstr("no server at 127.0.0.1:1: "));
   EXPECT_THAT(text, HasSubstr("open files"));
 }
 
