@@ -30,7 +30,7 @@
 namespace hapticd {
 
 struct ClientOptions {
-  /// How long the constructor waits for a connection before it throws; 0: it does not wait.
+  /// How long the constructor waits for a connection before it throws; 0: it does not wait for one.
   std::chrono::milliseconds connectTimeout{3000};
   /// Whether to reconnect, without limit, when a connection ends.
   bool reconnect = true;
@@ -75,7 +75,8 @@ class HAPTICD_EXPORT Client {
   /// Opens NAME@host or NAME@host:port (VRPN's default: a request by UDP, a TCP connection from the server,
   /// fast reports by UDP), or NAME@tcp://host:port (one TCP connection, which passes most firewalls). The
   /// port is 3883 unless given. Throws std::invalid_argument for another form, and ConnectError when there is
-  /// no such server or device within ClientOptions::connectTimeout.
+  /// no such server or device within ClientOptions::connectTimeout. Before that, the system looks the host
+  /// up, once; without an answer of a name server this takes as long as the system waits, 10 s by default.
   explicit Client(std::string_view device, const ClientOptions& options = {});
   /// Sends what is collected, and waits until the server has received it and ended the connection; reports
   /// that arrive meanwhile are discarded. The wait ends, too, when a server that has received everything does
@@ -115,7 +116,8 @@ class HAPTICD_EXPORT Client {
   Subscription onPose(Callback<PoseReport> callback);
   Subscription onVelocity(Callback<VelocityReport> callback);
   Subscription onAcceleration(Callback<AccelerationReport> callback);
-  /// On change, and once for each button that is down when a server connects.
+  /// On change, and once for each button that is down when a server connects, or was released while there was
+  /// no connection.
   Subscription onButton(Callback<ButtonReport> callback);
   Subscription onAnalog(Callback<AnalogReport> callback);
   Subscription onForce(Callback<ForceReport> callback);
@@ -187,8 +189,8 @@ class HAPTICD_EXPORT Client {
   /// Resets workspace, objects and effects to the initial state.
   void resetScene();
 
-  // --- Extensions of this project. Every call throws Unsupported when the connected server or its device
-  // does not support it, and may wait for the server's answer to that question (at most
+  // --- Extensions of this project. Every call but presentToken() throws Unsupported when the connected
+  // server or its device does not support it, and may wait for the server's answer to that question (at most
   // ClientOptions::connectTimeout, at least 1 s): then ConnectError without an answer, ConnectionLost when
   // the connection ends meanwhile.
 
@@ -221,7 +223,8 @@ class HAPTICD_EXPORT Client {
   /// when the server reads it.
   void stopForces();
   /// Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most
-  /// 255 bytes (std::invalid_argument). Sends at once. Throws ConnectionLost as stopForces().
+  /// 255 bytes (std::invalid_argument). Sends at once, before it asks whether the server knows markers.
+  /// Throws ConnectionLost as stopForces().
   void mark(std::string_view text);
   /// Ends a stop and clears latched trips; the force ramps in over half a second. It keeps its place behind
   /// the commands sent before it, and never undoes a stop that is sent after it. The server refuses it, by a

@@ -8,7 +8,7 @@ import time
 import weakref
 from collections import deque
 from dataclasses import dataclass
-from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, NoReturn, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Deque, Dict, Final, Generic, List, NamedTuple, NoReturn, Optional, Sequence, Set, Tuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -309,6 +309,7 @@ class Core(Commands):
         self.server: Final = address.server
         #: The newest report of each kind; changes while the client polls.
         self.latest = r.LatestReports()
+        self._held_at_loss: Set[int] = set()  # buttons that were down when a connection ended; until the next states
         self._address = address
         self._peer: Optional[Peer] = None
         self._backlog: List[bytes] = []  # commands before the first connection
@@ -509,16 +510,21 @@ class Core(Commands):
             self._handle_states(payload, stamp, arrived)
         elif kind in (_CONNECTED, _LOST):
             if kind == _LOST:
+                self._held_at_loss.update(button for button, pressed in self.latest.pressed.items() if pressed)
                 self.latest = r.LatestReports()
             self._call("connection", r.ConnectionReport(arrived, kind == _CONNECTED, payload.decode()))
 
     def _handle_states(self, payload: bytes, stamp: float, arrived: float) -> None:
-        """Servers resend all button states periodically; report changes only."""
+        """Servers resend all button states periodically; report changes only, and once what a person let go while
+        there was no connection."""
         try:
             states = m.LAYOUTS[_STATES].decode(payload).states
         except DecodeError:
             self._counts.messages_damaged += 1
             return
+        for button in sorted(self._held_at_loss):
+            if button >= len(states) or states[button] == 0:
+                self._deliver("button", r.ButtonReport(stamp, button, False), arrived - stamp)
         for button, state in enumerate(states):
             if self.latest.pressed.get(button, False) != (state != 0):
                 self._deliver("button", r.ButtonReport(stamp, button, state != 0), arrived - stamp)
@@ -534,6 +540,7 @@ class Core(Commands):
         elif name == "velocity":
             self.latest.velocity[report.sensor] = report
         elif name == "button":
+            self._held_at_loss.discard(report.button)
             self.latest.pressed[report.button] = report.pressed
         self._call(name, report)
 
@@ -690,13 +697,14 @@ class Core(Commands):
             raise ConnectError(
                 f"device '{self.device}' at {self.server} did not answer the question for its capabilities"
             )
+        self._refuse_other_makes(what)
         if not self._has(feature):
-            why = (
-                f"{self.server} is a VRPN server without the extensions of hapticd"
-                if self._offer is None
-                else f"device '{self.device}' at {self.server} does not support it"
-            )
-            raise Unsupported(f"cannot {what}: {why}")
+            raise Unsupported(f"cannot {what}: device '{self.device}' at {self.server} does not support it")
+
+    def _refuse_other_makes(self, what: str) -> None:
+        """Raises when the server has answered, and has no extensions. Does not wait."""
+        if self._answered and self._offer is None:
+            raise Unsupported(f"cannot {what}: {self.server} is a VRPN server without the extensions of hapticd")
 
     @property
     def capabilities(self) -> Optional[Capabilities]:

@@ -180,6 +180,9 @@ async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[st
         )
         text = f"{local} {server.sockets[0].getsockname()[1]}\0".encode()
         while not adopted.done():
+            # A machine that changes its network has another address: the server cannot call it at the former one.
+            if local_towards(target) != local:
+                raise OSError("this machine has another address now")  # the next attempt names it
             request.sendto(text)
             await asyncio.wait([adopted], timeout=1.0)
     finally:
@@ -736,6 +739,7 @@ class Client(Core):
     async def mark(self, text: str) -> None:
         """Marks a moment, such as "trial 3 begins"; see hapticd.Client.mark()."""
         self._send_at_once(m.Marker(0, text), "not marked")
+        self._refuse_other_makes("mark a moment")
 
     def present_token(self, token: str) -> None:
         """Presents a token for a role, on every connection from now on: 16 to 128 characters (ValueError).

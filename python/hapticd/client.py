@@ -470,7 +470,12 @@ class Client(Core):
             if at >= self._request_at:
                 self._request_at = at + 1.0
                 try:
-                    self._request.send(self._request_text)
+                    # A machine that changes its network has another address: the server cannot call it at the former one.
+                    if local_towards(self._target) != self._request.getsockname()[0]:
+                        self._drop_sockets()
+                        self._attempt()
+                    else:
+                        self._request.send(self._request_text)
                 except OSError as error:
                     self._last_failure = f"UDP request: {error.strerror}"
             until = min(until, self._request_at)
@@ -797,9 +802,10 @@ class Client(Core):
 
     def mark(self, text: str) -> None:
         """Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. Sent at once,
-        even inside batch(). An empty text marks the time alone. Raises ValueError for more than 255 bytes of UTF-8, and ConnectionLost as
-        stop_forces()."""
+        even inside batch(). An empty text marks the time alone. Raises ValueError for more than 255 bytes of UTF-8,
+        ConnectionLost as stop_forces(), and Unsupported when the server has answered that it knows no markers."""
         self._send_at_once(m.Marker(0, text), "not marked")
+        self._refuse_other_makes("mark a moment")
 
     def present_token(self, token: str) -> None:
         """Presents a token for a role, on every connection from now on: 16 to 128 characters (ValueError).

@@ -535,6 +535,8 @@ def test_errors() -> None:
         async with hapticd.aio.connect(scripted.name) as hand:
             with pytest.raises(hapticd.Unsupported, match="without the extensions"):
                 await hand.stop_forces()
+            with pytest.raises(hapticd.Unsupported, match="without the extensions"):
+                await hand.mark("trial 3 begins")
             await hand.upload_mesh(0, np.eye(3), [[0, 1, 2]])
         scripted.close()
         wrong = ScriptedServer(device="Tracker0")

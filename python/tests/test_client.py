@@ -431,6 +431,78 @@ def test_a_lost_network_is_noticed_and_the_client_reconnects() -> None:
     subprocess.run([*network, sys.executable, "-c", BREAKS_THE_NETWORK], check=True, env=environment, timeout=400)
 
 
+def test_requests_name_the_address_that_the_machine_has_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    address = "127.0.0.2"
+
+    def towards(_: Tuple[str, int]) -> str:
+        if not address:
+            raise OSError("Network is unreachable")
+        return address
+
+    for face in (hapticd.client, hapticd.aio):
+        monkeypatch.setattr(face, "local_towards", towards)
+
+    async def run() -> None:
+        nonlocal address
+        with contextlib.ExitStack() as opened:
+            asked = [opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2)]
+            for sock in asked:
+                sock.bind(("127.0.0.1", 0))
+                sock.setblocking(False)
+            names = [f"Phantom@127.0.0.1:{sock.getsockname()[1]}" for sock in asked]
+            hand = opened.enter_context(hapticd.connect(names[0], connect_timeout=0))
+            async with hapticd.aio.connect(names[1], connect_timeout=0):
+
+                async def both_ask_from(host: str) -> List[Tuple[str, int]]:
+                    ends: Dict[socket.socket, Tuple[str, int]] = {}
+                    deadline = time.monotonic() + 60
+                    while len(ends) < len(asked):
+                        assert time.monotonic() < deadline, f"asked from {host}: {ends}"
+                        hand.poll(0.01)
+                        await asyncio.sleep(0.01)
+                        for sock in asked:
+                            with contextlib.suppress(BlockingIOError):
+                                text = sock.recv(2048).rstrip(b"\0").decode().split()
+                                if text[0] == host:
+                                    ends[sock] = (text[0], int(text[1]))
+                    return list(ends.values())
+
+                await both_ask_from("127.0.0.2")
+                address = ""
+                for _ in range(75):
+                    hand.poll(0.01)
+                    await asyncio.sleep(0.01)
+                address = "127.0.0.3"
+                for end in await both_ask_from("127.0.0.3"):
+                    socket.create_connection(end, 60).close()  # it listens there
+
+    asyncio.run(run())
+
+
+def test_a_button_that_is_released_without_a_connection_is_reported_after_it() -> None:
+    """Otherwise a program holds for ever what its user has let go."""
+
+    def states(*pressed: int) -> bytes:
+        number, layout = _NUMBERS[m.ButtonStates]
+        return frame(1, 0, 0, number, layout.encode(m.ButtonStates(pressed)))
+
+    scripted = ScriptedServer()
+    scripted.answer = states(1, 0, 1, 1)
+    seen: List[Tuple[int, bool]] = []
+    with hapticd.connect(scripted.name) as hand:
+        hand.on_button(lambda report: seen.append((report.button, report.pressed)))
+        until(hand, lambda: len(seen) == 3)
+        seen.clear()
+        scripted.answer = states(0, 0, 1)
+        scripted.chatter = b"\xff" * 24  # breaks the protocol
+        hand.set_object_count(1)
+        until(hand, lambda: not hand.connected)
+        scripted.chatter = b""
+        until(hand, lambda: len(seen) == 3)
+    assert seen == [(0, False), (3, False), (2, True)]
+    scripted.close()
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say what is acknowledged")
 def test_a_peer_that_does_not_read_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     seconds = 100.0
@@ -533,7 +605,9 @@ def test_a_vrpn_server_without_extensions() -> None:
     scripted = ScriptedServer(extensions=False)
     with hapticd.connect(scripted.name) as hand:
         assert hand.wait_capabilities() is None
-        for call in (hand.stop_forces, hand.rearm_forces, hand.enable_heartbeat, lambda: hand.hold_hand((0, 0, 0))):
+        calls: List[Callable[[], None]] = [hand.stop_forces, hand.rearm_forces, hand.enable_heartbeat]
+        calls += [lambda: hand.hold_hand((0, 0, 0)), lambda: hand.mark("trial 3 begins")]
+        for call in calls:
             with pytest.raises(hapticd.Unsupported, match="without the extensions of hapticd"):
                 call()
         hand.upload_mesh(0, np.eye(3), [[0, 1, 2], [2, 1, 0]])

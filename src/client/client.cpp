@@ -54,6 +54,7 @@ void Client::Impl::waitConnected(Duration timeout) {
   if (!link.waitConnected(timeout)) throw ConnectError(device + ": " + link.whyNotConnected());
   const Duration left = timeout - Duration(base::now() - start);
   if (!link.waitHeard(sender, std::max(left, kShortestAnswer))) {
+    if (!link.connected()) throw ConnectError(device + ": " + link.whyNotConnected());
     throw ConnectError("no device '" + device + "' answers at " + server + "; it has " +
                        joined(link.serverDevices()));
   }

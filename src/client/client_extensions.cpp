@@ -52,7 +52,7 @@ bool Client::Impl::waitAnswered() {
   return answered && link.connected();
 }
 
-void Client::Impl::require(wire::Feature feature, std::string_view what) {
+void Client::Impl::requireExtensions(std::string_view what) {
   if (!link.connected()) waitConnected(options.connectTimeout);
   if (!waitAnswered()) {
     if (!link.connected())
@@ -60,10 +60,16 @@ void Client::Impl::require(wire::Feature feature, std::string_view what) {
     throw ConnectError("device '" + device + "' at " + server +
                        " did not answer the question for its capabilities");
   }
+  if (offer) return;
+  throw Unsupported("cannot " + std::string(what) + ": " + server +
+                    " is a VRPN server without the extensions of hapticd");
+}
+
+void Client::Impl::require(wire::Feature feature, std::string_view what) {
+  requireExtensions(what);
   if (has(feature)) return;
-  throw Unsupported("cannot " + std::string(what) + ": " +
-                    (offer ? "device '" + device + "' at " + server + " does not support it"
-                           : server + " is a VRPN server without the extensions of hapticd"));
+  throw Unsupported("cannot " + std::string(what) + ": device '" + device + "' at " + server +
+                    " does not support it");
 }
 
 std::optional<Capabilities> Client::capabilities() const {
@@ -149,6 +155,7 @@ void Client::Impl::requireFits(std::string_view call, std::string_view text, std
 void Client::mark(std::string_view text) {
   Impl::requireFits("mark()", text, decltype(wire::Marker::text)::kMost);
   impl_->sendAtOnce(wire::Marker{.time = 0, .text = std::string(text)}, "not marked");
+  impl_->requireExtensions("mark a moment");
 }
 
 void Client::setObjectName(int object, std::string_view name) {

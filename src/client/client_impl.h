@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <tuple>
 
 #include "client/callbacks.h"
@@ -47,7 +48,9 @@ struct HAPTICD_HIDDEN Client::Impl {
   void onArrival(wire::MessageKind kind, wire::LocalSender from, wire::ByteView payload);
   /// Waits for the answer to the question for capabilities; false when the server does not answer.
   bool waitAnswered();
-  /// Throws unless the device has the feature: Unsupported, or ConnectError and ConnectionLost.
+  /// Throws unless the server is one of this project: Unsupported, or ConnectError and ConnectionLost.
+  void requireExtensions(std::string_view what);
+  /// The same unless the device has the feature.
   void require(wire::Feature feature, std::string_view what);
   /// Sends a stop on a second connection, and waits until the server has confirmed it; see
   /// Client::stopForces().
@@ -93,6 +96,7 @@ struct HAPTICD_HIDDEN Client::Impl {
   bool heartbeats = false;
   net::Subscription heartbeatTimer;
   LatestReports latest;
+  std::set<int> heldAtLoss;  // buttons that were down when a connection ended; until the next states
   std::array<ReportStatistics, kReportKinds> reports{};
   std::uint64_t damaged = 0;
   std::string firstError;  // that the server reported since the last poll

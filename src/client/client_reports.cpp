@@ -171,12 +171,26 @@ void Client::Impl::dispatch(const Arrival& arrival) {
     return;
   }
   const bool up = arrival.what == Arrival::What::connected;
-  if (!up) latest = {};
+  if (!up) {
+    for (const auto& [button, pressed] : latest.pressed) {
+      if (pressed) heldAtLoss.insert(button);
+    }
+    latest = {};
+  }
   callbacksFor<ConnectionReport>().call({arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
 }
 
-// Servers resend all button states periodically; report changes only.
+// Servers resend all button states periodically; report changes only, and once what a person let go while
+// there was no connection.
 void Client::Impl::handle(const Arrival& arrival, const wire::ButtonStates& states) {
+  const auto isDown = [&](int button) {
+    const auto index = static_cast<std::size_t>(button);
+    return index < states.states.values.size() && states.states.values[index] != 0;
+  };
+  while (!heldAtLoss.empty()) {
+    const int button = heldAtLoss.extract(heldAtLoss.begin()).value();
+    if (!isDown(button)) deliver(arrival, ButtonReport{{}, button, false});
+  }
   for (std::size_t i = 0; i < states.states.values.size(); ++i) {
     const int button = static_cast<int>(i);
     const bool pressed = states.states.values[i] != 0;
@@ -220,6 +234,7 @@ void Client::Impl::dispatchMessage(const Arrival& a) {
       });
     case wire::kindOf<wire::ButtonChange>:
       return decode<wire::ButtonChange>(a, [&](const auto& m) {
+        heldAtLoss.erase(m.button);
         deliver(a, ButtonReport{{}, m.button, m.state != 0});
       });
     case wire::kindOf<wire::ButtonStates>:

@@ -45,15 +45,13 @@ std::chrono::system_clock::time_point wallTimePoint() {
   return std::chrono::system_clock::time_point(std::chrono::nanoseconds(base::wallNow()));
 }
 
-Link::Link(const ServerAddress& server, const LinkOptions& options)
+Link::Link(const ServerAddress& server, const LinkOptions& options) try
     : process_(::getpid()), server_(server), options_(options) {
-  try {
-    if (server_.socket.empty()) address_ = {net::resolve(server_.host), server_.port};
-  } catch (const net::Error& error) {
-    throw ConnectError("no server at " + server_.text() + ": " + error.what());
-  }
+  if (server_.socket.empty()) address_ = {net::resolve(server_.host), server_.port};
   loop_.setErrorHandler([this](std::string_view text) { lastFailure_ = text; });
   attempt();
+} catch (const net::Error& error) {  // also of the loop
+  throw ConnectError("no server at " + server.text() + ": " + error.what());
 }
 
 // The system resets a connection that is closed with unread reports, and drops what it has not sent.

@@ -10,8 +10,8 @@
 
 namespace hapticd::client {
 
-/// Asks a server for a connection every second until it is destroyed. Thread: that of the loop. Its callbacks
-/// may destroy it.
+/// Asks a server for a connection every second until it is destroyed, from the address that this machine has
+/// at that time. Thread: that of the loop. Its callbacks may destroy it.
 class ReverseConnection {
  public:
   /// Throws net::Error when there is no route to the server or no socket.
@@ -19,11 +19,17 @@ class ReverseConnection {
                     std::function<void(net::Connection)> onConnection, std::function<void()> onRefused);
 
  private:
+  void open(std::uint32_t address);
   void request();
 
-  net::Endpoint local_;
-  net::TcpListener listener_;
-  net::UdpSocket socket_;
+  net::Loop& loop_;
+  const net::Endpoint server_;
+  const net::ConnectionOptions options_;
+  const std::function<void(net::Connection)> onConnection_;
+  const std::function<void()> onRefused_;
+  std::uint32_t address_ = 0;  // of this machine; 0: nothing is open
+  std::optional<net::TcpListener> listener_;
+  std::optional<net::UdpSocket> socket_;
   std::string message_;
   net::Subscription timer_;
 };

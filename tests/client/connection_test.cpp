@@ -3,6 +3,14 @@
 
 #include <time.h>
 
+#include <cerrno>
+#include <system_error>
+#include <thread>
+
+#include "net/loop_impl.h"
+#include "net/network.h"
+#include "wire/udp_request.h"
+
 namespace hapticd::test {
 namespace {
 
@@ -136,6 +144,87 @@ TEST(Client, NotAVrpnServer) {
   ScriptedServer server({.greetingBytes = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"});
   const std::string text = textOf<ConnectError>([&] { Client(server.tcpName(), {.connectTimeout = 300ms}); });
   EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
+}
+
+TEST(Client, AConnectionThatIsLostBeforeTheDeviceAnswersIsTheCause) {
+  ScriptedServer server({.answersPings = false});
+  std::thread damage([&] {
+    while (server.connections() == 0) std::this_thread::sleep_for(1ms);
+    server.sendRawBytes(std::string(24, '\xff'));
+  });
+  const std::string text = textOf<ConnectError>([&] { Client(server.tcpName(), {.reconnect = false}); });
+  damage.join();
+  EXPECT_THAT(text, HasSubstr("no VRPN server at 127.0.0.1:" + std::to_string(server.port())));
+  EXPECT_THAT(text, HasSubstr("broke the VRPN protocol"));
+}
+
+/// The network of a program that has no file descriptor left.
+class NoDescriptors final : public net::Network {
+ public:
+  std::unique_ptr<net::Loop::Impl> makeLoop() override {
+    throw std::system_error(EMFILE, std::system_category());
+  }
+  std::uint32_t resolve(const std::string&) override { return net::kLoopbackAddress; }
+  std::uint32_t localAddressTowards(const std::string&) override { return net::kLoopbackAddress; }
+};
+
+TEST(Client, AProgramWithoutAFreeDescriptorIsToldSo) {
+  NoDescriptors none;
+  const net::ScopedNetwork scope(none);
+  const std::string text = textOf<ConnectError>([] { Client("Phantom@tcp://127.0.0.1:1"); });
+  EXPECT_THAT(text, HasSubstr("no server at 127.0.0.1:1: "));
+  EXPECT_THAT(text, HasSubstr("open files"));
+}
+
+/// The system's network, as seen by a machine whose own address changes.
+class Roaming final : public net::Network {
+ public:
+  std::unique_ptr<net::Loop::Impl> makeLoop() override { return system_.makeLoop(); }
+  std::uint32_t resolve(const std::string& host) override { return system_.resolve(host); }
+  std::uint32_t localAddressTowards(const std::string& host) override {
+    if (address == 0) throw net::Error("no route to " + host);
+    return address;
+  }
+  std::uint32_t address = net::kLoopbackAddress + 1;  // 127.0.0.2; 0: there is no network
+
+ private:
+  net::Network& system_ = net::network();
+};
+
+TEST(Client, ItsRequestsNameTheAddressThatItsMachineHasNow) {
+  Roaming machine;
+  const net::ScopedNetwork scope(machine);
+  net::Loop loop;
+  net::UdpSocket requests(loop, {net::kLoopbackAddress, 0});
+  std::optional<wire::UdpRequest> request;
+  requests.start({.onDatagram =
+                      [&](auto bytes, const net::Endpoint&) {
+                        if (const auto read = wire::parseUdpRequest(bytes)) request = *read;
+                      },
+                  .onRefused = {}});
+  Client client("Phantom@127.0.0.1:" + std::to_string(requests.local().port), {.connectTimeout = 0ms});
+  const auto until = [&](auto&& condition) {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!condition() && std::chrono::steady_clock::now() < end) {
+      client.poll(1ms);
+      loop.runOnce(1ms);
+    }
+    return condition();
+  };
+  const auto asksFrom = [&](const char* host) {
+    return until([&] { return request && request->host == host; });
+  };
+  ASSERT_TRUE(asksFrom("127.0.0.2"));
+  machine.address = 0;
+  client.runFor(1500ms);
+  machine.address = net::kLoopbackAddress + 2;
+  ASSERT_TRUE(asksFrom("127.0.0.3"));
+
+  bool called = false;
+  net::Connection call =
+      net::Connection::connect(loop, net::Endpoint::parse(request->host, request->port), 2s);
+  call.start({.onConnected = [&] { called = true; }});
+  EXPECT_TRUE(until([&] { return called; })) << "it listens there";
 }
 
 TEST(Client, KeepsCommandsBeforeTheFirstConnection) {

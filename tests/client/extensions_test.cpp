@@ -65,13 +65,15 @@ TEST(Extensions, ErrorsNameAServerWithoutExtensions) {
   refused([&] { client.holdHand({}); });
   refused([&] { client.releaseHand(); });
   refused([&] { client.stopForces(); });
+  refused([&] { client.mark("trial 3 begins"); });
   client.setObjectCount(1);
   client.flushAll();
-  const auto received = server.waitReceived(3);
-  ASSERT_EQ(received.size(), 3U);
+  const auto received = server.waitReceived(4);
+  ASSERT_EQ(received.size(), 4U);
   EXPECT_EQ(received[0].message.kind(), wire::kindOf<wire::Identify>);
   EXPECT_TRUE(is(received[1], wire::StopForces{})) << "a stop does not wait for an answer";
-  EXPECT_TRUE(is(received[2], wire::SetObjectNumber{1}));
+  EXPECT_TRUE(is(received[2], wire::Marker{0, "trial 3 begins"})) << "nor does a marker";
+  EXPECT_TRUE(is(received[3], wire::SetObjectNumber{1}));
 }
 
 TEST(Extensions, ErrorsNameADeviceWithoutTheFeature) {

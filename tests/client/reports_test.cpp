@@ -130,6 +130,31 @@ TEST(Client, ButtonsAreReportedOnChangeOnly) {
   EXPECT_EQ(seen, (std::vector<std::pair<int, bool>>{{1, true}, {1, false}, {0, true}}));
 }
 
+// Otherwise a program holds for ever what its user has let go.
+TEST(Client, AButtonThatIsReleasedWhileThereIsNoConnectionIsReportedAfterIt) {
+  ScriptedServer server;
+  Client client(server.tcpName());
+  using Seen = std::vector<std::pair<int, bool>>;
+  Seen seen;
+  int connections = 0;
+  client.onButton([&](const ButtonReport& r) { seen.emplace_back(r.button, r.pressed); });
+  client.onConnection([&](const ConnectionReport& r) { connections += r.connected ? 1 : 0; });
+  server.send(wire::ButtonStates{{{1, 0, 1, 1, 1}}});
+  ASSERT_TRUE(pollUntil(client, [&] { return seen.size() == 4; }));
+  seen.clear();
+  const std::size_t pings = server.pings();
+  server.dropClients();
+  ASSERT_TRUE(pollUntil(client, [&] { return connections == 2 && server.pings() > pings; }));
+  EXPECT_EQ(seen, Seen{});
+
+  server.send(wire::ButtonChange{3, 0});
+  server.send(wire::ButtonStates{{{0, 0, 1, 0}}});
+  server.send(wire::ButtonStates{{{0, 0, 1, 0}}});
+  server.send(wire::ButtonChange{9, 1});
+  ASSERT_TRUE(pollUntil(client, [&] { return !seen.empty() && seen.back().first == 9; }));
+  EXPECT_EQ(seen, (Seen{{3, false}, {0, false}, {4, false}, {2, true}, {9, true}}));
+}
+
 TEST(Client, ReportsOfOtherDevicesAreIgnored) {
   ScriptedServer server;
   Client client(server.tcpName());
