@@ -130,6 +130,9 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
     effects_.erase(known);
   }
   Owned<RunningEffect>& entry = effects_[c.index];
+  // One that has ended waits for the clock of the servo to end it, too: another duration would go on with it.
+  const Nanos lasted = entry.value.effect.duration;
+  if (lasted > 0 && call.now - entry.value.startedAt >= lasted) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
   entry.value.asked = c;
