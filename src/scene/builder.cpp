@@ -231,8 +231,10 @@ class SceneBuilder::State {
     updateWorkspace();
   }
   void updateWorkspace() {
+    const Affine T_device_before = workspace_.T_device_world;
     workspace_ =
         workspaceFrom(T_scene_haptic_ * Eigen::UniformScaling<double>(hapticScale_) * T_world_device_);
+    forces_.keepResetInPlace(workspace_.T_world_device * T_device_before);
     changed_ = true;
   }
   void resetWorkspace() {
@@ -245,9 +247,9 @@ class SceneBuilder::State {
   }
 
   void apply(ResetScene&, const Call& call) {
+    forces_.reset(call.client, call.now);  // before the view, which they stay out of
     resetWorkspace();
     objects_.reset();
-    forces_.reset(call.now);
     ++resets_;
   }
 

@@ -52,6 +52,7 @@ struct Effect {
   std::uint32_t start = 0;                            ///< counts starts of this index
   bool inDeviceFrame = false;  ///< motor vibration on the device's x and y instead of the stylus'
   bool releasing = false;      ///< its owner is gone: ramp out in 250 ms
+  bool onDevice = false;       ///< its place has left the world: no view moves it
   std::shared_ptr<const ForceOwner> owner;  ///< null: of no client
 };
 

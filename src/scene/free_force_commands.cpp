@@ -126,10 +126,14 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   if (known != effects_.end() && known->second.value.effect.releasing) {
-    leavingEffects_.push_back({known->second.owner, known->second.value.effect, known->second.goneAt});
+    leavingEffects_.push_back(
+        {known->second.owner, known->second.value.effect, known->second.goneAt, known->second.outOfWorld});
     effects_.erase(known);
   }
   Owned<RunningEffect>& entry = effects_[c.index];
+  // One that has ended waits for the clock of the servo to end it, too: another duration would go on with it.
+  const Nanos lasted = entry.value.effect.duration;
+  if (lasted > 0 && call.now - entry.value.startedAt >= lasted) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
   entry.value.asked = c;
@@ -315,7 +319,7 @@ void FreeForces::letFieldLeave() {
 FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
   if (constraint_ && constraint_->value.releasing) {
     if (const auto field = fieldOf(constraint_->value))
-      addLeaving({constraint_->owner, *field, constraint_->goneAt}, leavingFields_);
+      addLeaving({constraint_->owner, *field, constraint_->goneAt, constraint_->outOfWorld}, leavingFields_);
     constraint_.reset();
   }
   if (!constraint_) {

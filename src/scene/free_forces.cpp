@@ -17,6 +17,49 @@ double stiffnessOf(const ForceField& field, double worldUnitsPerMetre) {
   return Eigen::JacobiSVD<Mat3>(field.jacobian_N_per_unit).singularValues()[0] * worldUnitsPerMetre;
 }
 
+// Takes forces from one world to another that is a similarity of it. Newtons stay newtons.
+class Similarity {
+ public:
+  explicit Similarity(const Affine& motion)
+      : motion_(motion), scale_(geometry::scaleOf(motion.linear())), rotation_(motion.linear() / scale_) {}
+
+  void operator()(Effect& effect) const {
+    effect.position = motion_ * effect.position;
+    effect.direction = rotation_ * effect.direction;
+    effect.onDevice = true;
+  }
+  void operator()(RunningEffect& running) const { (*this)(running.effect); }
+  void operator()(Plane& plane) const {
+    const Vec3 point = motion_ * Vec3(-plane.offset * plane.normal);
+    plane.normal = (rotation_ * plane.normal).normalized();
+    plane.offset = -plane.normal.dot(point);
+    plane.textureAmplitude *= scale_;
+    plane.textureWavelength *= scale_;
+    plane.buzzAmplitude *= scale_;
+  }
+  void operator()(ForceField& field) const {
+    field.origin = motion_ * field.origin;
+    field.force_N = rotation_ * field.force_N;
+    field.jacobian_N_per_unit = rotation_ * field.jacobian_N_per_unit * rotation_.transpose() / scale_;
+    field.radius *= scale_;
+  }
+  void operator()(ForceConstraint& constraint) const {
+    const auto place = [this](Vec3& point_m) { point_m = motion_ * Vec3(1000 * point_m) / 1000; };
+    place(constraint.point_m);
+    place(constraint.linePoint_m);
+    place(constraint.planePoint_m);
+    constraint.lineDirection = (rotation_ * constraint.lineDirection).normalized();
+    constraint.planeNormal = (rotation_ * constraint.planeNormal).normalized();
+    constraint.stiffness_N_per_m /= scale_;
+  }
+  void operator()(Buzz& buzz) const { buzz.force_N = rotation_ * buzz.force_N; }
+
+ private:
+  Affine motion_;
+  double scale_;
+  Mat3 rotation_;
+};
+
 }  // namespace
 
 FreeForces::FreeForces(const SceneConfig& config) : config_(config), bound_(config) {}
@@ -241,13 +284,14 @@ void FreeForces::boundReleasingEffects() {
 
 // What ramps out stays as weak as it was beside the others, although it counts no more.
 template <class F>
-void FreeForces::release(const F& whose, Nanos now) {
+void FreeForces::release(const F& whose, Nanos now, bool endsWorld) {
   const double load = load_Ns_per_m(worldUnitsPerMetre_);
   const double share = std::min(share_, shareTogether(load));
   // True for one that begins to ramp out.
   const auto letGo = [&](auto& owned, bool& releasing) {
     if (!whose(owned.owner) || releasing) return false;
     releasing = true;
+    owned.outOfWorld = endsWorld;
     owned.goneAt = std::min(owned.goneAt, now + kRelease);
     return changed_ = true;
   };
@@ -274,11 +318,32 @@ void FreeForces::release(const F& whose, Nanos now) {
 }
 
 void FreeForces::clientGone(ClientId client, Nanos now) {
-  release([client](ClientId owner) { return owner == client; }, now);
+  release([client](ClientId owner) { return owner == client; }, now, false);
 }
 
-void FreeForces::reset(Nanos now) {
-  release([](ClientId) { return true; }, now);
+template <class F>
+void FreeForces::forEachForce(const F& f) {
+  for (auto& [index, entry] : effects_) f(entry);
+  for (auto& entry : leavingEffects_) f(entry);
+  for (auto& [index, entry] : planes_) f(entry);
+  for (auto& entry : leavingFields_) f(entry);
+  if (planeDetail_) f(*planeDetail_);
+  if (field_) f(*field_);
+  if (constraint_) f(*constraint_);
+  if (buzz_) f(*buzz_);
+}
+
+// The server clears a scene on behalf of a client that left, whose forces ramp out already.
+void FreeForces::reset(ClientId client, Nanos now) {
+  release([](ClientId) { return true; }, now, true);
+  forEachForce([client](auto& owned) { owned.outOfWorld = owned.outOfWorld || owned.owner == client; });
+}
+
+void FreeForces::keepResetInPlace(const Affine& motion) {
+  const Similarity move(motion);
+  forEachForce([&](auto& owned) {
+    if (owned.outOfWorld) move(owned.value);
+  });
 }
 
 template <class F>

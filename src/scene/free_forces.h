@@ -37,7 +37,8 @@ struct OwnedForce {
 
   ClientId owner = 0;
   T value;
-  Nanos goneAt = kNever;  ///< when it has ended or ramped out
+  Nanos goneAt = kNever;    ///< when it has ended or ramped out
+  bool outOfWorld = false;  ///< ramps out since a reset ended its world: stays on the device
 };
 
 struct RunningEffect {
@@ -80,8 +81,11 @@ class FreeForces {
 
   /// The forces that the client owns ramp out and are removed.
   void clientGone(ClientId client, Nanos now);
-  /// All forces ramp out and are removed.
-  void reset(Nanos now);
+  /// All forces ramp out and are removed, on behalf of this client.
+  void reset(ClientId client, Nanos now);
+  /// The view changes: what ramps out since a reset stays where it is on the device, as it would pull
+  /// elsewhere, or reach the hand anew. `motion` is from the world of the view before to that of the new one.
+  void keepResetInPlace(const Affine& motion);
 
   std::optional<Nanos> nextDeadline() const;
   /// Removes ended forces and reports startEffect calls whose definition never arrived. True when something
@@ -120,9 +124,11 @@ class FreeForces {
   void start(Owned<RunningEffect>& entry, ClientId client, Nanos at);
   void start(std::int32_t index, Nanos at, const Call& call);
   template <class F>
-  void release(const F& whose, Nanos now);
+  void release(const F& whose, Nanos now, bool endsWorld);
   std::size_t countEffects(bool releasing) const;
   void boundReleasingEffects();
+  template <class F>
+  void forEachForce(const F& f);
   template <class F>
   void forEachDeadline(const F& f) const;
   std::optional<ForceField> fieldOf(const Constraint& constraint) const;

@@ -109,6 +109,15 @@ const GoesOn kGoesOn[] = {
        r.glide({1, 19, 2}, 300);
        r.glide(kAbove, 400);
      }},
+    {"planePlacedAnew",
+     [](LateRecording& r) {
+       r.send(scene::SetPlane{0, {0, 1, 0, -0.0195}, 0.3, 0.001, 0.2, 0.1, 10});
+       r.send(scene::SetPlaneDetail{0, 0, 0.0002, 0.002, 0.0005, 33.3});
+       r.glide({1, 19, 2}, 300);
+       r.glide(kAbove, 407);
+       r.send(scene::SetPlane{0, {0, 1, 0, -0.0196}, 0.3, 0.001, 0.2, 0.1, 10});
+       r.glide(kAbove, 100);
+     }},
     {"heat",
      [](LateRecording& r) {
        r.glide({1, 15, 2}, 3037);

@@ -113,6 +113,35 @@ TEST_F(Forces, TimedEffectsLeaveAfterTheirTimeAndCanBeStoppedBefore) {
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("stopEffect 9"));
 }
 
+// Its entry waits for the clock of the servo: no force may return that nobody has started.
+TEST_F(Forces, AnEffectThatHasEndedStaysEndedWhenItIsDefinedAnew) {
+  for (const double duration_ms : {0.0, 500.0}) {
+    say(constant(1, 100));
+    say(StartEffect{1});
+    publish();
+    wait(110 * kMillisecond);
+    say(constant(1, duration_ms));
+    publish();
+    EXPECT_TRUE(scene_->effects.empty()) << duration_ms;
+    say(StartEffect{1});
+    publish();
+    EXPECT_EQ(scene_->effects.size(), 1U);
+    say(StopEffect{1});
+    run(100 * kMillisecond);
+  }
+}
+
+TEST_F(Forces, ARunningEffectGoesOnWithAnotherDuration) {
+  say(constant(1, 100));
+  say(StartEffect{1});
+  wait(90 * kMillisecond);
+  say(constant(1, 300));
+  run(200 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  run(100 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+}
+
 // 0 lasts until the effect is stopped: neither less nor almost nothing may become it unnoticed.
 TEST_F(Forces, DurationsBelowZeroAreToldAndShortOnesEnd) {
   say(constant(1, -5));

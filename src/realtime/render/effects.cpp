@@ -95,26 +95,32 @@ void Effects::Running::changeFriction(double gain, double limit_N, const Vec3& p
   frictionLimit_N = limit_N;
 }
 
-Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& proxy) noexcept {
+Effects::Running* Effects::find(const Effect& effect) noexcept {
   for (int i = 0; i < count_; ++i) {
     Running& r = running_[static_cast<std::size_t>(i)];
     if (r.index == effect.index && r.start == effect.start) return &r;
   }
+  return nullptr;
+}
+
+Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& proxy) noexcept {
+  if (Running* const known = find(effect)) return known;
   if (count_ == static_cast<int>(running_.size())) return nullptr;
   Running& fresh = running_[static_cast<std::size_t>(count_++)];
   fresh = {effect.index, effect.start, now, -1, proxy, true, {}, 0, 0};
   return &fresh;
 }
 
-// A surface that rubs belongs to the world; a view that jumps leaves it to the hand.
-void Effects::moveWithView(const scene::Workspace& view, const Vec3& proxy) noexcept {
-  const Affine T_world_before = std::exchange(T_world_device_, view.T_world_device);
+// A surface that rubs belongs to the world; a view that jumps leaves it to the hand, as does one that a
+// reset ended.
+void Effects::moveWithView(const scene::SceneSnapshot& scene, const Vec3& proxy) noexcept {
+  const Affine T_world_before = std::exchange(T_world_device_, scene.workspace.T_world_device);
   if (T_world_before.matrix() == T_world_device_.matrix()) return;
-  const ViewMotion motion{view.T_device_world, T_world_before};
+  const ViewMotion motion{scene.workspace.T_device_world, T_world_before};
   if (motion.jumpsAt(proxy)) return;
-  for (int i = 0; i < count_; ++i) {
-    Vec3& anchor = running_[static_cast<std::size_t>(i)].anchor;
-    anchor = motion.of(anchor);
+  for (const Effect& effect : scene.effects) {
+    Running* const r = effect.onDevice ? nullptr : find(effect);
+    if (r != nullptr) r->anchor = motion.of(r->anchor);
   }
 }
 
@@ -150,7 +156,7 @@ Vec3 Effects::forceOf(const Effect& effect, Running& r, const Affine& T_device_w
 
 Vec3 Effects::force(const scene::SceneSnapshot& scene, const device::DeviceState& device,
                     const Rendering& contact, double pressed_N, Nanos now) noexcept {
-  moveWithView(scene.workspace, contact.proxy_m);
+  moveWithView(scene, contact.proxy_m);
   const bool anew = std::exchange(anew_, false);
   for (int i = 0; i < count_; ++i) {
     Running& running = running_[static_cast<std::size_t>(i)];

@@ -63,8 +63,9 @@ class Effects {
 
   static Vec3 forceOf(const scene::Effect& effect, Running& r, const Affine& T_device_world,
                       const device::DeviceState& device, const Rendering& contact, Nanos now) noexcept;
+  Running* find(const scene::Effect& effect) noexcept;
   Running* running(const scene::Effect& effect, Nanos now, const Vec3& proxy) noexcept;
-  void moveWithView(const scene::Workspace& view, const Vec3& proxy) noexcept;
+  void moveWithView(const scene::SceneSnapshot& scene, const Vec3& proxy) noexcept;
   void forgetUnseen() noexcept;
 
   bool contactVibrationPulls_;

@@ -37,7 +37,9 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
   known->placement = plane.placement;
   known->placed = now;
   known->detail = detailOf(plane);
-  known->depth_m = std::max(0.0, depth_m - before.under_m);
+  const bool goesOn = known != end && before.releaseBegin < 0;
+  known->buzzing = goesOn ? before.buzzing : now;
+  known->depth_m = std::max(0.0, depth_m + (goesOn ? before.wave_m : 0) - before.under_m);
   known->leftOut = before.leftOut;
   if (before.touched && before.releaseBegin < 0) {
     known->touched = true;
@@ -48,23 +50,26 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
 }
 
 // Height of the surface above the plane itself, metres.
-double PlacedPlanes::heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
+double PlacedPlanes::heightOf(const scene::Plane& plane, Memory& memory, Nanos now,
                               double metresPerUnit) const noexcept {
   const double age = base::toSeconds(now - memory.placed);
   const double recovery = std::max(base::toSeconds(plane.recovery), memory.depth_m / kFastest_m_per_s);
   const auto onDevice = [&](double amplitude) {
     return std::min(metresPerUnit * amplitude, scene::kHighestDetail_m);
   };
-  double height = 0;
-  if (age < recovery) height -= memory.depth_m * (1 - age / recovery);
+  const double missing_m = age < recovery ? memory.depth_m * (1 - age / recovery) : 0;
+  double texture_m = 0;
   if (plane.textureWavelength > 0) {
     // The first contact becomes the centre of the texture, so the HIP always meets a crest.
     const Vec3 offset = memory.touched ? Vec3(proxy_ - memory.firstContact) : Vec3(Vec3::Zero());
     const double r = (offset - plane.normal * plane.normal.dot(offset)).norm();
-    height += onDevice(plane.textureAmplitude) * std::cos(kTau * r / plane.textureWavelength);
+    texture_m = onDevice(plane.textureAmplitude) * std::cos(kTau * r / plane.textureWavelength);
   }
-  height += onDevice(plane.buzzAmplitude) * std::sin(plane.buzzAngularFrequency_rad_per_s * age);
-  return height;
+  const double buzzed_s = base::toSeconds(now - memory.buzzing);
+  const double buzz_m =
+      onDevice(plane.buzzAmplitude) * std::sin(plane.buzzAngularFrequency_rad_per_s * buzzed_s);
+  memory.wave_m = texture_m + buzz_m;
+  return texture_m - missing_m + buzz_m;
 }
 
 // A plane that returns after it was removed counts as new.
@@ -189,7 +194,11 @@ bool PlacedPlanes::remember(RenderMemory& out) const noexcept {
   for (std::size_t i = 0; i < out.planeCount; ++i) {
     const Memory& m = memory_[i];
     if (m.touched || m.adheres || m.leftOut || m.releaseBegin >= 0) return false;
-    out.planes[i] = {m.index, m.placed, m.depth_m, m.raised_m};
+    // One time for both: where the placement brought nothing below it, the hand does not feel since when.
+    const bool rises = m.depth_m > 0;
+    const bool buzzes = m.detail[4] > 0;
+    if (rises && buzzes && m.placed != m.buzzing) return false;
+    out.planes[i] = {m.index, rises ? m.placed : m.buzzing, m.depth_m, m.raised_m};
   }
   return true;
 }
@@ -203,7 +212,7 @@ void PlacedPlanes::resume(const RenderMemory& memory) noexcept {
     const auto known =
         std::find_if(memory.planes.begin(), end, [&](const PlaneMemory& p) { return p.index == m.index; });
     if (known == end) continue;
-    m.placed = known->placed;
+    m.placed = m.buzzing = known->placed;
     m.depth_m = known->depth_m;
     m.raised_m = known->raised_m;
   }

@@ -66,11 +66,13 @@ class PlacedPlanes {
     std::int32_t index = 0;
     std::uint32_t placement = 0;
     Nanos placed = 0;
+    Nanos buzzing = 0;  ///< since when, however often it was placed since
     Nanos releaseBegin = -1;
     double depth_m = 0;  ///< by which the placement brought the HIP below it
     double under_m = 0;  ///< of the HIP below the surface, in the last tick
     scene::Surface surface;
     std::array<double, 6> detail{};  ///< adhesion, texture, buzz
+    double wave_m = 0;               ///< height of texture and buzz, in the last tick
     double raised_m = 0;             ///< of the surface above the plane, in the last tick
     bool belowCrest = false;         ///< the HIP is below the crests of the texture
     bool touched = false;            ///< and the tool has not left it since
@@ -85,8 +87,7 @@ class PlacedPlanes {
   void followJump(const ViewMotion& view) noexcept;
   bool isTouched() const noexcept;
   bool placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept;
-  double heightOf(const scene::Plane& plane, const Memory& memory, Nanos now,
-                  double metresPerUnit) const noexcept;
+  double heightOf(const scene::Plane& plane, Memory& memory, Nanos now, double metresPerUnit) const noexcept;
 
   std::array<PlacedPlane, scene::kMaxPlanes> planes_;
   int count_ = 0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "loop.h"
 
@@ -25,6 +26,16 @@ void addConstraint(Loop& loop, double stiffness_N_per_m) {
   loop.send(scene::SetConstraintMode{1});
   loop.send(scene::SetConstraintStiffness{stiffness_N_per_m});
   loop.send(scene::SetConstraintEnabled{true});
+}
+
+// A view that is turned by a right angle, of half the scale and off the centre.
+void turnView(Loop& loop) {
+  loop.send(scene::SetHapticScale{0.5});
+  loop.send(
+      scene::SetHapticOrigin{.position_m = {0.01, 0.02, 0}, .axis = {0, 0, 1}, .angle_rad = std::asin(1.0)});
+}
+Vec3 inTurnedView(const Vec3& device_m) {
+  return {10 - 500 * device_m.y(), 20 + 500 * device_m.x(), 500 * device_m.z()};
 }
 
 // Rests until the client has gone and nothing is left.
@@ -97,6 +108,113 @@ TEST(Leaving, spring_of_another_is_as_stiff_as_alone) {
   loop.send(scene::StartEffect{0}, 2);
   loop.rest({0.0002, 0, 0}, 400 * kMs);
   EXPECT_NEAR(loop.out.force_N.x(), -0.0002 * 9000, 1e-6);
+}
+
+using Start = void (*)(Loop& loop);
+
+// At 0.03, 0.01 and 0 m, in the view of turnView().
+const std::pair<const char*, Start> kForces[] = {
+    {"constant",
+     [](Loop& loop) {
+       loop.send(scene::DefineEffect{.type = "constant", .magnitude_N = 2, .direction = {1, 0, 0}});
+       loop.send(scene::StartEffect{0});
+     }},
+    {"spring",
+     [](Loop& loop) {
+       loop.send(scene::DefineEffect{
+           .type = "spring", .gain = 0.5, .magnitude_N = 3, .position = inTurnedView({0.03, 0.01, 0})});
+       loop.send(scene::StartEffect{0});
+     }},
+    {"friction", [](Loop& loop) { start(loop, 0, "friction", 0.5); }},
+    {"field",
+     [](Loop& loop) {
+       loop.send(scene::SetForceField{.origin_m = inTurnedView({0.03, 0.01, 0}) / 1000,
+                                      .force_N = {0.5, 0, 0},
+                                      .jacobian_N_per_m = {-900, 20, 0, 0, -300, 0, 0, 0, 0},
+                                      .radius_m = 0.01});
+     }},
+    {"point",
+     [](Loop& loop) {
+       loop.send(
+           scene::SetConstraintVector{scene::ConstraintVector::point, inTurnedView({0.03, 0.01, 0}) / 1000});
+       addConstraint(loop, 500);
+     }},
+    {"line",
+     [](Loop& loop) {
+       addConstraint(loop, 500);
+       loop.send(scene::SetConstraintMode{2});
+       loop.send(scene::SetConstraintVector{scene::ConstraintVector::linePoint,
+                                            inTurnedView({0.03, 0.01, 0}) / 1000});
+       loop.send(scene::SetConstraintVector{scene::ConstraintVector::lineDirection, {1, 1, 0}});
+     }},
+    {"plane of a constraint",
+     [](Loop& loop) {
+       addConstraint(loop, 500);
+       loop.send(scene::SetConstraintMode{3});
+       loop.send(scene::SetConstraintVector{scene::ConstraintVector::planePoint,
+                                            inTurnedView({0.03, 0.01, 0}) / 1000});
+       loop.send(scene::SetConstraintVector{scene::ConstraintVector::planeNormal, {1, 1, 0}});
+     }},
+    {"plane",
+     [](Loop& loop) {
+       const Vec3 normal = Vec3(-1, 0.5, 0).normalized();
+       const double d = -normal.dot(inTurnedView({0.031, 0.01, 0})) / 1000;
+       loop.send(scene::SetPlane{.plane = {normal.x(), normal.y(), normal.z(), d}, .stiffness = 0.6});
+     }},
+};
+
+// The world has ended, and its view: the forces keep their place and direction on the device, whatever the
+// view becomes.
+TEST(Leaving, by_a_reset_in_place) {
+  const std::pair<const char*, Start> views[] = {
+      {"reset", [](Loop& loop) { loop.send(scene::ResetScene{}); }},
+      {"reset and the same view again",
+       [](Loop& loop) {
+         loop.send(scene::ResetScene{});
+         turnView(loop);
+       }},
+      {"reset on behalf of a client that left",
+       [](Loop& loop) {
+         loop.leave(1);
+         loop.send(scene::ResetScene{});
+       }},
+      {"reset and a view some millimetres away",
+       [](Loop& loop) {
+         loop.send(scene::ResetScene{});
+         loop.send(scene::SetHapticScale{0.5});
+         loop.send(
+             scene::SetHapticOrigin{.position_m = {0.012, 0.02, 0}, .axis = {0, 0, 1}, .angle_rad = 1.5});
+       }},
+      {"reset and new forces, and then a view",
+       [](Loop& loop) {
+         loop.send(scene::ResetScene{});
+         loop.send(scene::DefineEffect{.type = "constant", .magnitude_N = 0});
+         loop.send(scene::SetConstraintMode{0});
+         loop.send(scene::SetForceField{});
+         loop.send(scene::SetHapticScale{3});
+       }},
+  };
+  for (const auto& [name, begin] : kForces) {
+    for (const auto& [change, view] : views) {
+      SCOPED_TRACE(std::string(name) + ", " + change);
+      Loop loop;
+      turnView(loop);
+      loop.tick({0.029, 0.009, 0});
+      begin(loop);
+      loop.rest({0.029, 0.009, 0}, 10 * kMs);
+      const Vec3 hip_m(0.0312, 0.0093, 0);
+      const Vec3 before_N = loop.to(hip_m).force_N;
+      ASSERT_GT(before_N.norm(), 0.05);
+      view(loop);
+      const Nanos left = loop.now + kMs;
+      double off_N = 0;
+      loop.rest(hip_m, 300 * kMs, [&] {
+        const double share = std::max(0.0, 1 - base::toSeconds(loop.now - left) / 0.25);
+        off_N = std::max(off_N, (loop.out.force_N - share * before_N).norm());
+      });
+      EXPECT_LT(off_N, 1e-6);
+    }
+  }
 }
 
 // A mass in a hand of 5 N s/m that moves when the client leaves: many dampers, each with all of the bound.

@@ -417,6 +417,23 @@ TEST_P(FreeForcesTest, texture_and_buzz_move_the_plane) {
   }
 }
 
+// Stock clients send the plane below the hand again and again.
+TEST_P(FreeForcesTest, buzz_goes_on_while_its_plane_is_placed_anew) {
+  scene::Plane p = floor(0);
+  p.buzzAmplitude = units() * 0.0001;
+  p.buzzAngularFrequency_rad_per_s = 300;
+  scene.planes = {p};
+  start({0, 0, 0.001});
+  for (int i = 1; i < 200; ++i) {
+    if (i > 40 && i % (i < 120 ? 7 : 1) == 0) {
+      ++p.placement;
+      scene.planes = {p};
+      hand->show(scene.snapshot());
+    }
+    EXPECT_NEAR(at({0, 0, -0.001}).force_N.z(), 1 + 0.1 * std::sin(0.3 * i), 1e-4) << i;
+  }
+}
+
 // A client that takes them for millimetres, or sends what it never set: the plane does not lift the hand
 // across the workspace.
 TEST_P(FreeForcesTest, texture_and_buzz_raise_the_plane_by_at_most_10_mm) {
