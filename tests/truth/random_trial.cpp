@@ -152,8 +152,8 @@ class Maker {
     shapes_.push_back(fan(dice_.integer(256, 1200), kHalf_m, dice_.uniform(-0.02, 0.02)));
   }
 
-  // Pits, ridges and narrow valleys, where three faces hold the proxy and one of them ends. Only on request, so
-  // that seeds of the other kinds give the scenes that they always gave.
+  // Pits, ridges and narrow valleys, where three faces hold the proxy and one of them ends. Only on request,
+  // so that seeds of the other kinds give the scenes that they always gave.
   void makeValleys() {
     if (dice_.chance(0.5)) {
       shapes_.push_back(sphere(dice_.integer(2, 5), 0.014, dice_.uniform(0.2, 0.6), dice_));

@@ -383,6 +383,7 @@ TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
     RemoteRig rig;
     const Nanos began = rig.now;
     const auto travelled = [&](Nanos at) { return kSpeed_m_per_s * base::toSeconds(at - began); };
+    double held_N = 0;
     for (int i = 0; i < 1500; ++i) {
       if (i % 10 == 0) {
         RemoteContact belt = floorAt(0, 1000);
@@ -391,13 +392,39 @@ TEST(RemoteContacts, FrictionOfAMovingSurfaceKeepsUpWithLateTicks) {
         rig.state({belt});
       }
       const Nanos lateNow = i > 600 && i % 50 == 0 ? late : 0;
+      // On the belt the hand strains forward, and then rides along.
+      const double ahead_m = 1e-6 * std::clamp(i - 300, 0, 200);
       rig.hand.velocity_m_per_s.x() = kSpeed_m_per_s;
-      rig.hand.position_m = {travelled(rig.now + kMs + lateNow), std::max(-0.002, 0.002 - 2e-5 * i), 0};
+      rig.hand.position_m = {travelled(rig.now + kMs + lateNow) + ahead_m, std::max(-0.002, 0.002 - 2e-5 * i),
+                             0};
       rig.step(lateNow);
-      ASSERT_NEAR(rig.force.x(), 0, 1e-6) << "tick " << i << ", late by " << late / kMs << " ms";
+      if (i <= 600) held_N = rig.force.x();
+      ASSERT_NEAR(rig.force.x(), i < 300 ? 0 : held_N, 1e-6)
+          << "tick " << i << ", late by " << late / kMs << " ms";
     }
+    EXPECT_LT(held_N, -0.05);
     EXPECT_NEAR(rig.force.y(), 2, 1e-6);
   }
+}
+
+// Below a hand at rest it stretches the spring of friction by its way, however few ticks that takes.
+TEST(RemoteContacts, FrictionOfAMovingSurfaceGrowsInLateTicks) {
+  RemoteContact belt = floorAt(0, 1000);
+  belt.staticFriction = belt.dynamicFriction = 0.8;
+  belt.velocity_m_per_s.x() = 2e-4;
+  const auto draggedBy = [&](Nanos late) {
+    RemoteRig rig;
+    rig.approach({belt}, {0, 0.002, 0}, {0, -0.002, 0});
+    const Nanos end = rig.now + 500 * kMs;
+    for (int i = 0; rig.now < end; ++i) {
+      if (i % 10 == 0) rig.state({belt});
+      rig.step(i % 20 == 0 ? std::min(late, end - rig.now - kMs) : 0);
+    }
+    return rig.force.x();
+  };
+  const double inTime_N = draggedBy(0);
+  EXPECT_GT(inTime_N, 0.05);
+  for (const Nanos late : {2 * kMs, 5 * kMs, 14 * kMs}) EXPECT_NEAR(draggedBy(late), inTime_N, 1e-6);
 }
 
 // A recording that begins between both does not know that the view moved: it must not matter.

@@ -190,6 +190,21 @@ TEST_F(StreamedInputTest, ABurstAfterAPauseIsOneMessage) {
   EXPECT_EQ(sendAll(20'176, 20'400, 0), 400);
 }
 
+// Of a fast stream it is hardly faster than it was made.
+TEST_F(StreamedInputTest, ABurstOfAFastStreamIsOneMessage) {
+  std::vector<double> n = floorAt(0);
+  n[18] = 400;
+  n[23] = 1;
+  const base::Nanos start = now_;
+  const auto sendAt = [&](base::Nanos arrived, int ms) {
+    now_ = start + arrived;
+    send(n, 1, 0, start + (ms - 5) * kStreamMillisecond);
+  };
+  for (int ms = 0; ms < 400; ++ms) sendAt((ms + 5) * kStreamMillisecond, ms);
+  for (int i = 0; i < 6; ++i) sendAt(555 * kStreamMillisecond + i * 600'000, 400 + i);
+  EXPECT_EQ(first().stiffness_N_per_m, 400);
+}
+
 TEST_F(StreamedInputTest, FacingSurfacesShareTheBoundWhereTheyMaySqueezeTheHand) {
   const auto stiffnessOfFloorUnder = [&](double ceiling_m, double sinking_m_per_s = 0) {
     std::vector<double> n = floorAt(0, 1);
