@@ -93,9 +93,9 @@ std::shared_ptr<ReportGroup> Outbox::group(const DeviceName& name, const ReportC
 
 void Outbox::sendPresentState(Session& session, const ReportGroup& group) {
   if (newest_->tick.tick == 0) return;  // add() reports the state with the first tick
-  std::vector<Outgoing> messages;
-  group.presentState(*newest_, messages);
-  for (const Outgoing& out : messages) session.sendReliably(group.name(), out.message, newest_->time);
+  group.presentState(*newest_, [&](const wire::Message& message, wire::Time time) {
+    session.sendReliably(group.name(), message, time);
+  });
   session.flush();
 }
 

@@ -67,16 +67,14 @@ void ReportGroup::beginPass() {
   passed_ = end();
 }
 
-void ReportGroup::presentState(const TimedTick& newest, std::vector<Outgoing>& out) const {
-  if (!reported_) {
-    reporter_.presentState(newest.tick, newest.frame, out);
-    return;
-  }
+void ReportGroup::presentState(const TimedTick& newest, const SendMessage& send) const {
   // Buttons and guard are reported with every tick, due or not.
-  TimedTick state = *reported_;
+  TimedTick state = reported_ ? *reported_ : newest;
   state.tick.guard = newest.tick.guard;
   state.frame.buttons = newest.frame.buttons;
+  std::vector<Outgoing> out;
   reporter_.presentState(state.tick, state.frame, newest.tick.rendering.touching, out);
+  for (const Outgoing& each : out) send(each.message, isLowLatency(each) ? state.time : newest.time);
 }
 
 // Without what must not be lost: the client got all of that.

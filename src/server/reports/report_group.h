@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -74,9 +75,11 @@ class ReportGroup {
     return sent;
   }
 
-  /// Appends the state for a client that has just subscribed and gets all links from end() on: of the last
-  /// reported tick, because the next link holds the changes since then. Without one, of `newest`.
-  void presentState(const TimedTick& newest, std::vector<Outgoing>& out) const;
+  /// The state for a client that has just subscribed and gets all links from end() on: of the last reported
+  /// tick, because the next link holds the changes since then, and what is reported with every tick of
+  /// `newest`. Calls send(message, time of its tick).
+  using SendMessage = std::function<void(const wire::Message&, wire::Time)>;
+  void presentState(const TimedTick& newest, const SendMessage& send) const;
 
  private:
   struct Link {

@@ -221,6 +221,7 @@ TEST_F(ReportPass, ANewClientStartsFromTheReportedState) {
     auto timed = std::make_shared<TimedTick>();
     timed->tick.tick = number;
     timed->tick.time = static_cast<Nanos>(number) * kMs;
+    timed->time = {static_cast<std::uint32_t>(number), 0};
     timed->tick.rendering.touching = touching;
     if (touching) timed->tick.force_N = Vec3(0, 0, 1);
     return timed;
@@ -228,15 +229,23 @@ TEST_F(ReportPass, ANewClientStartsFromTheReportedState) {
   group.add(at(1000, false), false);
   group.add(at(1001, false), false);
   group.add(at(1010, true), false);  // not due, and over before the next report
-  std::vector<Outgoing> state;
-  group.presentState(*at(1010, true), state);
-  for (const Outgoing& out : state) {
-    const auto* force = out.message.as<wire::Force>();
-    const auto* touching = out.message.as<wire::IsTouching>();
-    EXPECT_TRUE(force == nullptr || force->force[2] == 0);
+  int forces = 0;
+  int buttons = 0;
+  group.presentState(*at(1010, true), [&](const wire::Message& message, wire::Time time) {
+    if (const auto* force = message.as<wire::Force>()) {
+      ++forces;
+      EXPECT_EQ(force->force[2], 0);
+      EXPECT_EQ(time.seconds, 1000U) << "of the values";
+    }
+    const auto* touching = message.as<wire::IsTouching>();
     EXPECT_TRUE(touching == nullptr || touching->touching == 0);
-  }
-  EXPECT_FALSE(state.empty());
+    if (message.as<wire::ButtonStates>() != nullptr) {
+      ++buttons;
+      EXPECT_EQ(time.seconds, 1010U);
+    }
+  });
+  EXPECT_EQ(forces, 1);
+  EXPECT_EQ(buttons, 1);
 }
 
 }  // namespace pass
