@@ -114,17 +114,10 @@ endfunction()
 set(HAPTICD_STD_HEADERS <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <cstring> <deque> <functional> <map> <memory>
   <mutex> <optional> <span> <sstream> <stdexcept> <string> <string_view> <thread> <tuple> <unordered_map> <utility> <variant>
   <vector>)
-set(headers LIBS Eigen3::Eigen HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
-hapticd_headers(hapticd_tick_headers ROOMS PIC OPTIONS ${HAPTICD_TICK_OPTIONS} ${headers})
-# Under ASan optimising rooms that do not compute takes more than half of their compile time, and saves less in the tests.
-set(HAPTICD_ROOM_OPTIONS "")
-set(HAPTICD_COMPUTING_HEADERS hapticd_room_headers)
-if(HAPTICD_SANITIZE MATCHES "address")
-  set(HAPTICD_ROOM_OPTIONS -O0)
-  set(HAPTICD_COMPUTING_HEADERS hapticd_computing_headers)
-  hapticd_headers(hapticd_computing_headers ROOMS PIC ${headers})
-endif()
-hapticd_headers(hapticd_room_headers ROOMS PIC OPTIONS ${HAPTICD_ROOM_OPTIONS} ${headers})
+hapticd_headers(hapticd_room_headers ROOMS PIC
+  LIBS Eigen3::Eigen HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
+hapticd_headers(hapticd_tick_headers ROOMS PIC
+  LIBS Eigen3::Eigen OPTIONS ${HAPTICD_TICK_OPTIONS} HEADERS ${HAPTICD_STD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
 
 # hapticd_library(NAME [TICK] SOURCES ... DEPENDS rooms ... [LIBS external ...] [PRIVATE_LIBS external ...])
 # One library for each folder of src/. DEPENDS lists the rooms that it may include; scripts/check_includes.sh reads it.
@@ -141,10 +134,7 @@ function(hapticd_library name)
     if(A_TICK)
       target_compile_options(hapticd_${name} PRIVATE ${HAPTICD_TICK_OPTIONS})
       hapticd_speed_up(hapticd_${name} hapticd_tick_headers ALL)
-    elseif(CMAKE_CURRENT_SOURCE_DIR MATCHES "${HAPTICD_COMPUTING_ROOMS}")
-      hapticd_speed_up(hapticd_${name} ${HAPTICD_COMPUTING_HEADERS} ALL)
     else()
-      target_compile_options(hapticd_${name} PRIVATE ${HAPTICD_ROOM_OPTIONS})
       hapticd_speed_up(hapticd_${name} hapticd_room_headers ALL)
     endif()
   else()
