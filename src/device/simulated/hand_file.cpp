@@ -144,9 +144,8 @@ class HandFile::Parser {
     const TextLine line{source_, number};
     if (isBinary(content))
       line.fail(
-          "holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' makes it "
-          "of "
-          "a recording");
+          "holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' "
+          "makes it of a recording");
     split(content, cells_);
     if (cells_.size() < 4 && content.find_first_of(";\t") != std::string_view::npos)
       line.fail("columns end at commas, and numbers have a decimal point, got " + quoted(content));

@@ -189,9 +189,8 @@ TEST(HandFile, SaysHowColumnsAreSeparated) {
 // A recording, a text of UTF-16, a value of a megabyte: one line that a terminal can show.
 TEST(HandFile, ShowsNoBytesThatAreNoText) {
   const std::string binary =
-      ": holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' makes it of "
-      "a "
-      "recording";
+      ": holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' "
+      "makes it of a recording";
   EXPECT_EQ(errorOf(std::string("HAPTICS\n\0\0\0\1", 12)),
             "hand.csv:1: header 'HAPTICS' is not t_s,x_m,"
             "y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns time_ns,hip_x_m,hip_y_m,hip_z_m");
