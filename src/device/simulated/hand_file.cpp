@@ -16,6 +16,7 @@ namespace {
 constexpr double kLongest_s = 1e8;
 constexpr double kFarthest_m = 1e6;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
+constexpr std::string_view kRecordingBegins = "HAPTICS";  // its first line
 
 // The cells of a row, trimmed and without quotes around them. Commas in quotes do not separate.
 void split(std::string_view text, std::vector<std::string_view>& cells) {
@@ -142,7 +143,7 @@ class HandFile::Parser {
 
   void add(std::string_view content, std::size_t number) {
     const TextLine line{source_, number};
-    if (isBinary(content))
+    if (isBinary(content) || content == kRecordingBegins)
       line.fail(
           "holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' "
           "makes it of a recording");

@@ -191,9 +191,7 @@ TEST(HandFile, ShowsNoBytesThatAreNoText) {
   const std::string binary =
       ": holds binary data: a hand is text with one row on each line; 'hapticd export --to csv' "
       "makes it of a recording";
-  EXPECT_EQ(errorOf(std::string("HAPTICS\n\0\0\0\1", 12)),
-            "hand.csv:1: header 'HAPTICS' is not t_s,x_m,"
-            "y_m,z_m[,qx,qy,qz,qw][,buttons] and has no columns time_ns,hip_x_m,hip_y_m,hip_z_m");
+  EXPECT_EQ(errorOf(std::string("HAPTICS\n\0\0\0\1", 12)), "hand.csv:1" + binary);
   EXPECT_EQ(errorOf(std::string("\xff\xfe"
                                 "0\0,\0",
                                 6)),
