@@ -148,8 +148,6 @@ class ContactQuery {
   /// As gather(), but reuses facets gathered before, also in an earlier tick, if they cover the ball. A ball
   /// tool gathers a reserve for that.
   bool ensureGathered(const Vec3& centre, double radius) noexcept;
-  /// The same, or a smaller ball where that does not fit: casts from there begin in it.
-  void gatherAround(const Vec3& centre, double radius) noexcept;
   /// Gathers what the tool may meet on its way from p to p + way in this tick, with a margin to all sides. A
   /// point tool gathers the same way once more, for the next tick; a ball has its reserve.
   void gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept;

@@ -409,14 +409,6 @@ bool ContactQuery::ensureWayGathered(const Vec3& from, const Vec3& way, double m
   return cache_.complete();
 }
 
-void ContactQuery::gatherAround(const Vec3& centre, double radius) noexcept {
-  bool fits = ensureGathered(centre, radius);
-  for (double smaller = 0.25 * radius; !fits && smaller > kSmallestGather_m && !workSpent();
-       smaller *= 0.25) {
-    fits = gather(centre, smaller);
-  }
-}
-
 void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) noexcept {
   const double length = way.norm();
   const double needed = kHalfWay * length + margin;
@@ -432,14 +424,14 @@ void ContactQuery::gatherAhead(const Vec3& p, const Vec3& way, double margin) no
     // Around the middle: the triangles that it reaches grow with the radius more than with the way.
     const double around = kBallWay * length + margin;
     if (around > fits_m_ || !ensureGathered(p + 0.5 * way, around))
-      gatherAround(p, std::min(needed, fits_m_));
+      ensureGathered(p, std::min(needed, fits_m_));
     return;
   }
   if (isReusable(needed) && cache_.covers(p + 0.5 * way, needed)) return;
   // Where that would be too many facets: the beginning of the way.
   const double reach = std::min(2 * needed, roomyReach_m_);
   const double lead = reach > needed ? 1 : std::min(1.0, kHalfWay * reach / length);
-  if (!gather(p + lead * way, reach)) gatherAround(p, reach);
+  if (!gather(p + lead * way, reach)) ensureGathered(p, reach);
 }
 
 }  // namespace hapticd::realtime

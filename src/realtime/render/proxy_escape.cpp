@@ -275,7 +275,7 @@ bool Proxy::searchDescent(const Vec3& target, const ActiveSet& active) noexcept 
   const double enough = pull.norm() - 2 * kLifts[0] * skin;
   if (!query_.isGathered(position_)) {
     const double reach = 1.5 * expectedTravel_m_ + kGatherMargin_m;
-    query_.gatherAround(position_, reach);
+    query_.ensureGathered(position_, reach);
     // What was gathered before may cover that with the proxy at its rim.
     if (!query_.isGathered(position_)) query_.gather(position_, reach);
   }
