@@ -81,7 +81,7 @@ void IsolatedDevice::open() {
     throw;
   }
   profile_.transportDelay_s += kOneTick_s;
-  silent_ = lostThere_ = false;
+  silent_ = lostThere_ = answered_ = false;
 }
 
 void IsolatedDevice::spawn(int socketOfChild) {
@@ -293,10 +293,14 @@ std::string IsolatedDevice::faultText() const {
   if (unanswered_ == 0 || !faultAsked_) send(kFault);
   try {
     fault_ = takeAnswers(base::now() + kGlance_ms * kMillisecond, Wait::toTheEnd);
+    answered_ = true;
     const std::string late = std::exchange(late_, {});
     if (fault_->empty()) fault_ = late;
   } catch (const NoAnswer& error) {
-    if (base::now() - asked_ > kNoAnswer) return error.what();
+    if (base::now() - asked_ > kNoAnswer) {
+      answered_ = true;
+      return error.what();
+    }
     if (!fault_) return "the driver's process has not answered yet";
   } catch (const std::exception& error) {
     return error.what();

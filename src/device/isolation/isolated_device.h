@@ -50,7 +50,8 @@ class IsolatedDevice final : public Device {
 
   /// Waits 5 ms at most for the driver's process, and tells what that said last where it takes longer.
   std::string faultText() const override;
-  bool lost() const noexcept override { return silent_ || lostThere_; }
+  /// A new process does not know why the device was lost, so this one may tell first, if it does within 5 s.
+  bool lost() const noexcept override { return silent_ || (lostThere_ && answered_); }
   void calibrate(const std::function<bool()>& stopped) override;
   using Device::calibrate;
   void interrupt() noexcept override { interrupted_ = true; }
@@ -96,6 +97,7 @@ class IsolatedDevice final : public Device {
   std::atomic<bool> interrupted_{false};
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};
+  mutable std::atomic<bool> answered_{false};  // the process has told of its fault, or has had time to
 
   std::atomic<std::uint64_t> commands_{0};  // counted by the loop's thread
 

@@ -428,7 +428,7 @@ bool Proxy::approach(const Vec3& target, bool stopAtFirst, ActiveSet& active, Ve
     if (!stopAtFirst || move > skin) position_ += hit.stop * displacement;
     if (!query_.isGathered(position_)) {
       query_.ensureGathered(position_,
-                          std::min(1.5 * expectedTravel_m_ + kGatherMargin_m, query_.roomyReach()));
+                            std::min(1.5 * expectedTravel_m_ + kGatherMargin_m, query_.roomyReach()));
     }
     active.hits[static_cast<std::size_t>(active.count++)] = hit;
   }

@@ -195,6 +195,33 @@ TEST_P(IsolationTest, AProcessThatDoesNotAnswerDelaysNobody) {
   EXPECT_TRUE(eventually([&] { return device.faultText().empty(); }));
 }
 
+// Of a busy machine: nothing was told since the device was opened. A new process would not know why it was
+// lost.
+TEST_P(IsolationTest, AProcessTellsWhyItsDeviceIsLostBeforeItIs) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->fault = 6;
+  push(device, Vec3::Zero());
+  ASSERT_TRUE(eventually([&] { return ticks_ > 20; })) << "the loss is known";
+  EXPECT_THAT(device.faultText(), HasSubstr("has not answered yet"));
+  EXPECT_FALSE(device.lost());
+  hand->fault = 7;
+  EXPECT_TRUE(eventually([&] { return device.faultText() == "words of the driver"; }));
+  EXPECT_TRUE(device.lost());
+}
+
+// 5 s, and the same for all.
+class SilentFault : public IsolationTest {};
+INSTANTIATE_TEST_SUITE_P(Paced, SilentFault, testing::Values("polled"));
+TEST_P(SilentFault, IsNotWaitedForLonger) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->fault = 6;
+  push(device, Vec3::Zero());
+  EXPECT_TRUE(eventually([&] { return device.faultText() == "the driver's process does not answer"; }));
+  EXPECT_TRUE(device.lost());
+}
+
 TEST_P(IsolationTest, ALateAnswerIsNotTakenForThatOfTheNextRequest) {
   IsolatedDevice device(host(GetParam()));
   device.open();

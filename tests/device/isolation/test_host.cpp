@@ -55,6 +55,7 @@ class ObservedDevice final : public Device {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     return "told once";
   }
+  bool lost() const noexcept override { return hand_.fault >= 6; }
   void calibrate(const std::function<bool()>& stopped) override {
     ++hand_.calibrations;
     while (hand_.fault == 5 && !stopped()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
