@@ -170,7 +170,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(wordsOf(argc, argv));
   } catch (const CLI::ParseError& error) {
-    return explain(app, error);
+    exitCode = explain(app, error);
   } catch (const hapticd::server::ConfigError& error) {
     std::fprintf(stderr, "hapticd: %s\n", error.what());
     return 2;

@@ -52,6 +52,7 @@ stage() {
   # Links to what has another place there, or is in the sources only.
   sed -i 's#](docs/#](#g' "$doc/releases.md"
   sed -i -E 's#\]\(\.\./CHANGELOG\.md#](releases.md#g; s#\]\(\.\./examples#](examples#g; s#\[([^]]*)\]\(\.\./[^)]*\)#\1#g' "$doc"/*.md
+  sed -i 's#](../docs/#](../#g' "$doc/examples/README.md"
   sed -i -E 's#\[([^]]*)\]\(\.\./\.\./[^)]*\)#\1#g' "$doc"/decisions/*.md
 }
 

@@ -42,6 +42,9 @@ fails_with "nosuch.csv" --hand nosuch.csv
 fails_with "device 'Phantom': " --hand .
 printf '\n[[device]]\nhand = "nosuch.csv"\n' >hand.toml
 fails_with "hand.toml:3: device 'Phantom': hand: nosuch.csv: cannot be read" --config hand.toml
+printf '[[device]]\ndriver = "evdev"\nwheel_profile = "wheel.toml"\n' >evdev.toml
+printf 'force_N = 4\naxis = 2\n' >wheel.toml
+fails_with "device 'Phantom': wheel_profile: wheel.toml:2: unknown key 'axis'; did you mean 'axes'?" --config evdev.toml
 printf '\ntokens = "nosuch"\n' >tokens.toml
 fails_with "tokens.toml:2: tokens: cannot read 'nosuch'" --config tokens.toml
 printf '\ntls = "%s/nosuch.pem"\ntls_key = "%s/nosuch.key"\n' "$work" "$work" >tls.toml

@@ -170,9 +170,12 @@ grep -q '^hapticd: .*everything before it was read' "$work/said"
 grep -q '^device      ' "$work/info" && grep -q '^  force     at most [0-9.]* N' "$work/info" && grep -q '^command     SetVertices, 4 times' "$work/info" ||
   { cat "$work/info"; exit 1; }
 
-status=0
-"$hapticd" info "$recording" >/dev/full 2>"$work/said" || status=$?
-[ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status"; exit 1; }
+for words in "info $recording" --version "serve --help"; do
+  status=0
+  "$hapticd" $words >/dev/full 2>"$work/said" || status=$?
+  [ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" ||
+    { cat "$work/said"; echo "status $status of $words"; exit 1; }
+done
 
 # What is interrupted leaves no file behind.
 printf 't_s,x_m,y_m,z_m\n0,0.2,0,0\n100000,0.3,0,0\n' >"$work/long.csv"

@@ -8,9 +8,15 @@ constexpr const char* kWheelProfile = "wheel_profile";
 constexpr const char* kKeys[] = {kWheelProfile};
 
 std::unique_ptr<Device> make(const DriverOptions& options) {
-  const auto profile = options.keys.find(kWheelProfile);
-  return std::make_unique<EvdevDevice>(EvdevOptions{
-      .path = options.hardware, .profile = profile == options.keys.end() ? "" : profile->second});
+  const auto given = options.keys.find(kWheelProfile);
+  const std::string profile = given == options.keys.end() ? "" : given->second;
+  try {
+    // open() reads it; a mistake in it is reported before a device is there.
+    if (!profile.empty()) WheelProfile::load(profile);
+  } catch (const WheelProfileError& error) {
+    throw InvalidDriverOption(std::string(kWheelProfile) + ": " + error.what());
+  }
+  return std::make_unique<EvdevDevice>(EvdevOptions{.path = options.hardware, .profile = profile});
 }
 
 }  // namespace

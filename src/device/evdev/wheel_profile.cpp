@@ -1,11 +1,16 @@
 #include "device/evdev/wheel_profile.h"
 
 #include <toml++/toml.h>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
 
+#include "base/nearest_name.h"
 #include "base/world.h"
 
 namespace hapticd::device {
@@ -19,35 +24,58 @@ class Reader {
     const toml::node* node = take(name);
     if (node == nullptr) return;
     const auto given = node->value<double>();
-    if (!given || !(*given >= least && *given <= most)) {
-      fail(name, "must be a number from " + std::to_string(least) + " to " + std::to_string(most));
-    }
+    if (!given || !(*given >= least && *given <= most)) fail(*node, name, "a number", least, most);
     value = *given;
+  }
+  void wholeNumber(const char* name, int& value, int least, int most) {
+    double number = value;
+    this->number(name, number, least, most);
+    if (number != std::floor(number)) fail(*table_.get(name), name, "a whole number", least, most);
+    value = static_cast<int>(number);
   }
   void flag(const char* name, bool& value) {
     const toml::node* node = take(name);
     if (node == nullptr) return;
-    if (!node->is_boolean()) fail(name, "must be true or false");
+    if (!node->is_boolean())
+      throw WheelProfileError(placeOf(*node) + name + " must be true or false, got " + textOf(*node));
     value = *node->value<bool>();
   }
   void finish() const {
-    if (taken_ == table_.size()) return;
-    throw WheelProfileError(file_ + ": unknown key");
+    for (const auto& [key, node] : table_) {
+      const std::string name(key.str());
+      if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
+      const std::optional<std::string> nearest = base::nearestName(name, known_);
+      std::string keys;
+      for (const std::string& known : known_) keys += (keys.empty() ? "use " : ", ") + known;
+      throw WheelProfileError(placeOf(node) + "unknown key '" + name + "'; " +
+                              (nearest ? "did you mean '" + *nearest + "'?" : keys));
+    }
   }
 
  private:
   const toml::node* take(const char* name) {
-    const toml::node* node = table_.get(name);
-    taken_ += node != nullptr ? 1 : 0;
-    return node;
+    known_.emplace_back(name);
+    return table_.get(name);
   }
-  [[noreturn]] void fail(const char* name, const std::string& what) const {
-    throw WheelProfileError(file_ + ": " + name + " " + what);
+  std::string placeOf(const toml::node& node) const {
+    return file_ + ":" + std::to_string(node.source().begin.line) + ": ";
+  }
+  static std::string textOf(const toml::node& node) {
+    std::ostringstream text;
+    node.visit([&](const auto& value) { text << value; });
+    return text.str();
+  }
+  [[noreturn]] void fail(const toml::node& node, const char* name, const char* what, double least,
+                         double most) const {
+    std::ostringstream text;
+    text << placeOf(node) << name << " must be " << what << " from " << least << " to " << most << ", got "
+         << textOf(node);
+    throw WheelProfileError(text.str());
   }
 
   const toml::table& table_;
   const std::string file_;
-  std::size_t taken_ = 0;
+  std::vector<std::string> known_;
 };
 
 }  // namespace
@@ -67,12 +95,11 @@ WheelProfile WheelProfile::load(const std::filesystem::path& file) {
     reader.number("stiffness_N_per_m", profile.stiffness_N_per_m, 1, 5000);
     reader.number("damper", profile.damper, 0, 1);
     reader.flag("invert_force", profile.invertForce);
-    double axes = 0;
-    reader.number("axes", axes, 0, 2);
-    profile.axes = static_cast<int>(axes);
+    reader.wholeNumber("axes", profile.axes, 0, 2);
     reader.finish();
   } catch (const toml::parse_error& error) {
-    throw WheelProfileError(file.string() + ": " + std::string(error.description()));
+    throw WheelProfileError(file.string() + ":" + std::to_string(error.source().begin.line) + ": " +
+                            std::string(error.description()));
   } catch (const std::system_error& error) {
     throw WheelProfileError(error.what());
   }

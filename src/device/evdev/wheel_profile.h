@@ -6,7 +6,7 @@
 
 namespace hapticd::device {
 
-/// A profile file that cannot be used; the text names the file and the value.
+/// A profile file that cannot be used; the text names file, line, key and value.
 class WheelProfileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

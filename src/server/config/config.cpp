@@ -195,7 +195,8 @@ DeviceConfig readDevice(const toml::table& table, const std::string& source) {
   if (table.get("report_rate_Hz") == nullptr)
     device.reportRate_Hz = std::min(device.reportRate_Hz, device.servoRate_Hz);
   reader.finish({{keysOf<ServerConfig>(), "above the first [[device]]"},
-                 {keysOf<LimitsConfig>(), "in [limits], which belongs above the first [[device]]"}});
+                 {keysOf<LimitsConfig>(), "in [limits], which belongs above the first [[device]]"},
+                 {keysOf<CompatConfig>(), "in [compat], which belongs above the first [[device]]"}});
   return device;
 }
 
@@ -220,7 +221,10 @@ Config readTable(const toml::node& node, const std::string& name, const std::str
   Reader reader(*table, source);
   visitFields(reader, config);
   const std::string place = "outside [" + name + "]";
-  reader.finish({{keysOf<ServerConfig>(), place}, {keysOf<DeviceConfig>(), place}});
+  reader.finish({{keysOf<ServerConfig>(), place},
+                 {keysOf<DeviceConfig>(), place},
+                 {keysOf<LimitsConfig>(), "in [limits]"},
+                 {keysOf<CompatConfig>(), "in [compat]"}});
   return config;
 }
 
@@ -259,7 +263,9 @@ ServerConfig read(const toml::table& root, const std::string& source) {
     config.compat = readTable<CompatConfig>(*node, "compat", source);
   if (const toml::node* node = reader.find("limits"))
     config.limits = readTable<LimitsConfig>(*node, "limits", source);
-  reader.finish({{keysOf<DeviceConfig>(), "in a [[device]]"}, {keysOf<LimitsConfig>(), "in [limits]"}});
+  reader.finish({{keysOf<DeviceConfig>(), "in a [[device]]"},
+                 {keysOf<LimitsConfig>(), "in [limits]"},
+                 {keysOf<CompatConfig>(), "in [compat]"}});
   return config;
 }
 

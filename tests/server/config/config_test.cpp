@@ -349,6 +349,10 @@ TEST(Config, ErrorsInCompatNameTheirLine) {
             "test.toml:2: haply_origins: \"localhost\" is not an origin such as http://localhost:5173");
   EXPECT_EQ(errorOf("[compat]\nhapli = \"\""), "test.toml:2: unknown key 'hapli'; did you mean 'haply'?");
   EXPECT_EQ(errorOf("compat = 3"), "test.toml:1: 'compat' must be a table: [compat]");
+  EXPECT_EQ(errorOf("haply = \"127.0.0.1:10001\""), "test.toml:1: 'haply' belongs in [compat]");
+  EXPECT_EQ(errorOf("[limits]\nhaply_hold_ms = 50"), "test.toml:2: 'haply_hold_ms' belongs in [compat]");
+  EXPECT_EQ(errorOf("[[device]]\nhaply_hold_ms = 50"),
+            "test.toml:2: 'haply_hold_ms' belongs in [compat], which belongs above the first [[device]]");
 }
 
 TEST(Config, KeysOfOtherDriversAreRefused) {
@@ -418,6 +422,7 @@ TEST(Config, LimitsHaveOneTableAndNameValueAndRemedy) {
   EXPECT_EQ(errorOf("[[device]]\neffects = 5"),
             "test.toml:2: 'effects' belongs in [limits], which belongs above the first [[device]]");
   EXPECT_EQ(errorOf("[limits]\nlisten = \"127.0.0.1\""), "test.toml:2: 'listen' belongs outside [limits]");
+  EXPECT_EQ(errorOf("[compat]\nobjects = 5"), "test.toml:2: 'objects' belongs in [limits]");
   EXPECT_EQ(errorOf("limits = 3"), "test.toml:1: 'limits' must be a table: [limits]");
   EXPECT_EQ(errorOf("[limits]\nmemory = 3"), "test.toml:2: unknown key 'memory'; did you mean 'memory_MB'?");
   EXPECT_EQ(errorOf("[limits]\nobjects = 100000"),

@@ -1,9 +1,12 @@
-// The Grafana dashboard in packaging/ may only query metrics that the server exports.
+// The Grafana dashboard in packaging/ may only query metrics that the server exports; docs/monitoring.md
+// names all of them.
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <set>
 
 #include "exposition.h"
 #include "server/web/state_report.h"
@@ -43,6 +46,18 @@ TEST(Dashboard, EveryPanelQueriesMetricsThatTheServerExports) {
   }
   for (const std::string& name : used) EXPECT_EQ(exported.names().count(name), 1u) << name;
   EXPECT_GE(used.size(), 15u);
+}
+
+TEST(Monitoring, ThePageNamesEveryMetricAndNoOther) {
+  std::ifstream file(HAPTICD_TESTDATA "/../docs/monitoring.md");
+  const std::string page((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const std::regex kName("`((?:hapticd|process)_[a-z0-9_]+)`");
+  std::set<std::string> named;
+  for (std::sregex_iterator i(page.begin(), page.end(), kName), end; i != end; ++i) named.insert((*i)[1]);
+  std::set<std::string> exported;
+  const test::Exposition read(metricsText(everything()));
+  for (const auto& [name, type] : read.types()) exported.insert(name);
+  EXPECT_EQ(named, exported);
 }
 
 }  // namespace

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "scene/builder.h"
 #include "server/web/state_report.h"
@@ -67,6 +71,44 @@ TEST(StateJson, HasTheFrameOfTheScene) {
                     {}}};
   const json scene = json::parse(stateJson(report))["scenes"][0];
   EXPECT_EQ(scene["T_world_scene"], json({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1}));
+}
+
+// Adds the names of all members at any depth.
+void addNames(const json& value, std::set<std::string>& names) {
+  if (value.is_object()) {
+    for (const auto& [name, member] : value.items()) names.insert(name);
+  }
+  if (!value.is_structured()) return;
+  for (const json& member : value) addNames(member, names);
+}
+
+TEST(StateJson, EveryMemberStandsOnThePageOfTheViewer) {
+  scene::SceneDescription description = scene::SceneBuilder(scene::SceneConfig{}).describe();
+  description.effects.resize(1);
+  description.planes.resize(1);
+  description.fields.resize(1);
+  description.constraint.emplace();
+  const std::size_t objects = description.objects.size();
+  ASSERT_GE(objects, 1U);
+  DeviceStatus device;
+  device.names = {"Arm"};
+  StateReport report;
+  report.server.devices = {device};
+  report.server.clients.resize(1);
+  report.server.replay.emplace().timeLine = std::make_shared<const TimeLine>();
+  report.server.scenes = {{"Arm"}};
+  report.scenes = {{std::make_shared<const ObservedScene>(
+                        ObservedScene{std::make_shared<const scene::SceneDescription>(description),
+                                      std::vector<std::uint64_t>(objects)}),
+                    std::vector<std::size_t>(objects)}};
+  std::set<std::string> names;
+  addNames(json::parse(stateJson(report)), names);
+  EXPECT_GE(names.size(), 80U);
+  std::ifstream file(HAPTICD_TESTDATA "/../docs/viewer.md");
+  const std::string page((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const std::string described = page.substr(page.find("## The state as JSON"));
+  for (const std::string& name : names)
+    EXPECT_NE(described.find("`" + name + "`"), std::string::npos) << "docs/viewer.md lacks " << name;
 }
 
 TEST(Faults, NameEveryDeviceThatDoesNotWork) {

@@ -1,13 +1,15 @@
 // Forces by their source, the placement of objects, and meshes for display.
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
 import { test } from "node:test";
-import { bundled } from "../bundled.mjs";
+import { bundled, sourceDir } from "../bundled.mjs";
 
 const { constraintForce, feltForces, fieldForce } = await bundled("sources.ts");
 const { coarse, smoothGeometry } = await bundled("scene3d/creases.ts");
 const { usualEnd, centres } = await bundled("plots/counts.ts");
 
-const { effectOf, onWire } = await bundled("panels/effects.ts");
+const { effectOf, FIELDS, labelOf, onWire } = await bundled("panels/effects.ts");
 
 const near = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 1e-9);
 
@@ -57,6 +59,22 @@ test("every source is named with its force; the rest belongs to the effects", ()
       ["effect 1 (constant)", 1],
     ],
   );
+});
+
+test("the page offers the parameters that the server uses of each effect", async () => {
+  // {"name", EffectType::type, gain, duration, frequency, position, direction}
+  const table = await readFile(join(sourceDir, "src/scene/effect.h"), "utf8");
+  let types = 0;
+  for (const [, type, flags] of table.matchAll(/\{"(\w+)", EffectType::\w+, ((?:true|false)(?:, (?:true|false)){4})\}/g)) {
+    if (!(type in FIELDS)) continue; // another name of the same type
+    ++types;
+    const names = ["gain", "duration_ms", "frequency", "position", "direction"];
+    const used = names.filter((_, i) => flags.split(", ")[i] === "true");
+    assert.deepEqual([...FIELDS[type]].sort(), [...used, "magnitude_N"].sort(), type);
+  }
+  assert.equal(types, Object.keys(FIELDS).length);
+  assert.equal(labelOf("spring", "gain"), "Gain, N/mm");
+  assert.equal(labelOf("viscous", "gain"), "Gain, N per mm/s");
 });
 
 /** A grid of squares on z = f(x, y). */

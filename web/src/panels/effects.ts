@@ -17,12 +17,13 @@ const NEW: Record<string, { label: string; effect: Partial<Effect> }> = {
 };
 
 type Parameter = "magnitude_N" | "gain" | "frequency" | "duration_ms" | "position" | "direction";
-const FIELDS: Record<string, Parameter[]> = {
+/** What the server uses of each type, as src/scene/effect.h says. */
+export const FIELDS: Record<string, Parameter[]> = {
   constant: ["magnitude_N", "direction", "duration_ms"],
-  spring: ["gain", "magnitude_N", "position"],
-  viscous: ["gain", "magnitude_N"],
-  friction: ["gain", "magnitude_N"],
-  vibrationMotor: ["magnitude_N", "frequency", "direction", "duration_ms"],
+  spring: ["gain", "magnitude_N", "position", "duration_ms"],
+  viscous: ["gain", "magnitude_N", "duration_ms"],
+  friction: ["gain", "magnitude_N", "duration_ms"],
+  vibrationMotor: ["magnitude_N", "frequency", "duration_ms"],
   vibrationContact: ["magnitude_N", "frequency", "duration_ms"],
 };
 const LABELS: Record<Parameter, string> = {
@@ -32,6 +33,11 @@ const LABELS: Record<Parameter, string> = {
   duration_ms: "Time, ms",
   position: "Position",
   direction: "Direction",
+};
+
+export const labelOf = (type: string, name: Parameter): string => {
+  if (name === "magnitude_N" && type === "constant") return "Force, N";
+  return name === "gain" && type === "viscous" ? "Gain, N per mm/s" : LABELS[name];
 };
 
 /** An effect with its frequency in Hz, as setEffect() takes it. */
@@ -60,7 +66,7 @@ class EffectForm {
   ) {
     for (const name of FIELDS[e.type] ?? ["magnitude_N"]) {
       const count = name === "position" || name === "direction" ? 3 : 1;
-      const label = name === "magnitude_N" && e.type === "constant" ? "Force, N" : LABELS[name];
+      const label = labelOf(e.type, name);
       const parts = Array.from({ length: count }, (_, i) => {
         const what = count === 3 ? `${label} ${"xyz"[i]!}` : label;
         const input = el("input", { type: "number", step: "any", ariaLabel: `${what} of effect ${e.index}` });
