@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from . import _messages as m
 from . import reports as r
-from ._address import local_towards, parse, resolve
+from ._address import HostLookup, local_towards, parse
 from ._codec import Numbers
 from ._commands import function
 from ._core import (
@@ -132,6 +132,7 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
         client = reference()
         if client is None or client._finished or (client._counts.connections and not client.options.reconnect):
             return
+        client._host.ask_again()
         del client
         await asyncio.sleep(RETRY_S)
 
@@ -142,14 +143,15 @@ async def _attempt(reference: "weakref.ref[Client]") -> Optional[asyncio.Event]:
     if client is None:
         return None
     client._lost.clear()
-    lost, target, tcp_only = client._lost, client._target, client._address.tcp_only
+    client._target = client._host.target
+    lost, host, target, tcp_only = client._lost, client._host, client._target, client._address.tcp_only
     del client
     try:
         if tcp_only:
             attempt = asyncio.get_running_loop().create_connection(lambda: _Stream(reference, False), *target)
             await asyncio.wait_for(attempt, 3.0)
         else:
-            await _ask_for_connection(reference, target)
+            await _ask_for_connection(reference, host, target)
         return lost
     except asyncio.TimeoutError:
         failure = "no answer to the connection attempt"
@@ -163,7 +165,7 @@ async def _attempt(reference: "weakref.ref[Client]") -> Optional[asyncio.Event]:
     return None
 
 
-async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[str, int]) -> None:
+async def _ask_for_connection(reference: "weakref.ref[Client]", host: HostLookup, target: Tuple[str, int]) -> None:
     loop = asyncio.get_running_loop()
     local = local_towards(target)
     adopted = loop.create_future()
@@ -183,8 +185,12 @@ async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[st
             # A machine that changes its network has another address: the server cannot call it at the former one.
             if local_towards(target) != local:
                 raise OSError("this machine has another address now")  # the next attempt names it
+            if host.target != target:
+                raise OSError("the server has another address now")  # the next attempt asks there
             request.sendto(text)
             await asyncio.wait([adopted], timeout=1.0)
+            if not adopted.done():
+                host.ask_again()
     finally:
         server.close()
         if request is not None:
@@ -266,7 +272,8 @@ class Client(Core):
         return running is not self._loop and (running is not None or self._loop.is_running() or self._loop.is_closed())
 
     async def _start(self) -> None:
-        self._target = await self._loop.run_in_executor(None, resolve, self._address)
+        self._host = await self._loop.run_in_executor(None, HostLookup, self._address)
+        self._target = self._host.target  # of the attempt
         self._task = self._loop.create_task(_stay_connected(weakref.ref(self)))
         if self.options.connect_timeout > 0:
             try:
