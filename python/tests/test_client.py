@@ -1078,6 +1078,29 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
             gc.enable()
 
 
+def test_remote_contacts_name_no_state_of_an_earlier_server() -> None:
+    scripted = ScriptedServer()
+    number, layout = _NUMBERS[m.HandState]
+    with hapticd.connect(scripted.name) as hand:
+
+        def hears(time_ns: int) -> None:
+            scripted.answer = frame(5, 0, 0, number, layout.encode(m.HandState(9, time_ns)))
+            hand._ping()
+            until(hand, lambda: hand.latest.hand.tick_time_ns == time_ns)
+            scripted.answer = b""
+
+        hears(77)
+        hand._fail("lost")
+        hand.wait_connected(60)  # without a poll: the loss is not reported yet
+        hand.set_remote_contacts([])
+        hears(99)
+        hand.set_remote_contacts([])
+        hand.flush_all()
+    contacts = [m.LAYOUTS[_NUMBERS[m.RemoteContacts][0]].decode(data) for name, data in scripted.received if name == "hapticd Remote_Contacts"]
+    assert [one.state_time for one in contacts] == [0, 99]
+    scripted.close()
+
+
 @pytest.mark.parametrize("closes", [True, False])
 def test_what_was_sent_arrives_although_the_client_ends(closes: bool) -> None:
     """The system resets a connection that is closed with unread reports, and drops what it has not sent."""
