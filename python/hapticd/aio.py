@@ -20,7 +20,8 @@ from collections import deque
 from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
 from typing import (
-    TYPE_CHECKING, Any, AsyncIterator, Callable, Deque, Generator, List, NoReturn, Optional, Sequence, Set, Tuple, Type,
+    TYPE_CHECKING, Any, AsyncIterator, Awaitable, Callable, Coroutine, Deque, Generator, List, NoReturn, Optional, Sequence, Set,
+    Tuple, Type, Union,
 )  # fmt: skip
 
 import numpy as np
@@ -681,10 +682,35 @@ class Client(Core):
         self._set_subscription(kinds, rate_Hz)
         self._push()
 
-    async def stop_forces(self) -> None:
+    def stop_forces(self) -> "Coroutine[Any, Any, None]":
         """Brings the force of the device to zero within one tick of its arrival, until rearm_forces(); on a second
-        connection, too, while more than 64 KiB of this one may be ahead of it. Raises as
-        hapticd.Client.stop_forces()."""
+        connection, too, while more than 64 KiB of this one may be ahead of it. The call itself sends the stop; the
+        coroutine, which should be awaited, tells whether it arrives: it raises as hapticd.Client.stop_forces(). In
+        another thread than the event loop's, the call does nothing, and asyncio.run_coroutine_threadsafe() hands the
+        coroutine over."""
+        return self._stop() if self._is_used_elsewhere() else self._stopped(self._send_stop())
+
+    async def _stop(self) -> None:
+        await self._stopped(self._send_stop())
+
+    async def _stopped(self, sent: "Union[None, Exception, Awaitable[None]]") -> None:
+        if isinstance(sent, Exception):
+            raise sent
+        if sent is not None:
+            await sent
+        else:
+            self._check_arrival("forces not stopped")
+        await self._require(m.FEATURE_STOP, "stop the forces")
+
+    def _send_stop(self) -> "Union[None, Exception, Awaitable[None]]":
+        """The second connection, when it needs one; or the reason why nothing was sent, which must not keep a program from
+        its next call: the stop of another device, perhaps."""
+        try:
+            return self._put_stop()
+        except Exception as error:
+            return error
+
+    def _put_stop(self) -> "Optional[Awaitable[None]]":
         backlog = self._peer.stream_bytes if self._peer is not None else 0
         if self._transport is not None:
             backlog += self._transport.get_write_buffer_size()
@@ -696,11 +722,7 @@ class Client(Core):
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
-        if behind:
-            await self._stop_beside(backlog)
-        else:
-            self._check_arrival("forces not stopped")
-        await self._require(m.FEATURE_STOP, "stop the forces")
+        return self._loop.create_task(self._stop_beside(backlog)) if behind else None
 
     def _send_at_once(self, message: Any, failure: str) -> None:
         if not self._put_now(message):
