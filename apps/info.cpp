@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/printable.h"
 #include "base/time.h"
 #include "commands.h"
 #include "record/recording_reader.h"
@@ -124,7 +125,8 @@ int run(const std::string& file, bool config, bool json) {
   for (const auto& [name, count] : facts.commands)
     std::printf("command     %s, %llu times\n", name.c_str(), static_cast<unsigned long long>(count));
   for (const record::MarkerEvent& marker : facts.markers)
-    std::printf("marker      %.3f s: %s\n", base::toSeconds(marker.time - facts.first), marker.text.c_str());
+    std::printf("marker      %.3f s: %s\n", base::toSeconds(marker.time - facts.first),
+                base::printable(marker.text).c_str());
   if (config) std::printf("\n%s", header.config.c_str());
   if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
   return statusFor(reader.remark());

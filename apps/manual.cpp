@@ -1,10 +1,12 @@
 // hapticd manual: man pages and shell completion, made from the same options as --help.
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "commands.h"
@@ -15,10 +17,16 @@ namespace {
 namespace fs = std::filesystem;
 
 void write(const fs::path& file, const std::string& text) {
-  fs::create_directories(file.parent_path());
+  const auto fail = [&](const std::error_code& why) {
+    throw std::runtime_error("cannot write '" + file.string() + "': " + why.message() +
+                             "; name a folder that can be written");
+  };
+  std::error_code why;
+  fs::create_directories(file.parent_path(), why);
+  if (why) fail(why);
   std::ofstream out(file);
   out << text;
-  if (!out.flush()) throw std::runtime_error(file.string() + " cannot be written");
+  if (!out.flush()) fail({errno, std::system_category()});
 }
 
 std::vector<std::string> linesOf(const std::string& text) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "client/host_lookup.h"
 #include "client/server_address.h"
 #include "commands.h"
 #include "hapticd/error.h"
@@ -157,13 +158,13 @@ int run(const TunnelOptions& options) {
   const client::ServerAddress server = client::parseServer(options.server);
   net::Loop loop;
   std::optional<tls::Context> context;
-  net::Endpoint address;
+  std::optional<client::HostLookup> host;
   if (!server.socket.empty() && !(options.fingerprint + options.authorities).empty())
     throw std::runtime_error(server.text() + " is a socket of this machine, without TLS: leave out " +
                              (options.fingerprint.empty() ? "--ca" : "--fingerprint"));
   if (server.socket.empty()) {
     context = contextOf(options, server.host);
-    address = {net::resolve(server.host), server.port};
+    host.emplace(server.host);
   }
   const net::Buffer token =
       options.tokenFile.empty() ? net::Buffer() : identification(readToken(options.tokenFile));
@@ -173,8 +174,10 @@ int run(const TunnelOptions& options) {
   link.closeTimeout = 24h;  // as long as the peer takes what is queued: nobody waits for it
   const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
   const Connect connect = [&] {
-    return context ? tls::wrap(*context, net::Connection::connect(loop, address, 3s, link))
-                   : net::connectLocal(loop, server.socket, link);
+    if (!context) return net::connectLocal(loop, server.socket, link);
+    const net::Endpoint address{host->address(), server.port};
+    host->askAgain();  // a client that fails tries again, then with the answer
+    return tls::wrap(*context, net::Connection::connect(loop, address, 3s, link));
   };
   if (context) {
     tryOnce(loop, connect, server.text());

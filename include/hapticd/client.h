@@ -50,7 +50,8 @@ struct UploadProgress {
 
 /// One device of one server.
 ///
-/// Thread: a client belongs to one thread and starts none. Several clients may live in several threads.
+/// Thread: a client belongs to one thread, and starts none but to look the name of its host up anew while it
+/// has no connection. Several clients may live in several threads.
 ///
 /// Callbacks run in poll() and runFor(), in the order of arrival. An exception that a callback throws leaves
 /// poll(); the remaining reports follow in the next poll(). A callback may call the client, but not destroy

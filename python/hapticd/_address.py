@@ -2,7 +2,9 @@
 
 import re
 import socket
-from typing import NamedTuple, Tuple
+import threading
+from contextlib import suppress
+from typing import NamedTuple, Optional, Tuple
 
 from ._codec import shortened, utf8
 from ._peer import DEFAULT_PORT, MAX_NAME_BYTES
@@ -58,6 +60,31 @@ def resolve(address: Address) -> Tuple[str, int]:
         raise ConnectError(f"no server at {address.server}: {error}") from error
     host, port = found[0][4][:2]
     return str(host), int(port)
+
+
+class HostLookup:
+    """The address of a host by its name: a server may come back under another address."""
+
+    def __init__(self, address: Address) -> None:
+        """Asks the system, which may block. Raises ConnectError for an unknown host."""
+        self._asked = address
+        self._thread: Optional[threading.Thread] = None
+        #: The last address that is known, and the port.
+        self.target = resolve(address)
+
+    def ask_again(self) -> None:
+        """In a thread of its own, because the system may take many seconds for the answer; nothing waits for it. Without
+        an answer the last address stays."""
+        is_number = self.target[0] == self._asked.host
+        if is_number or (self._thread is not None and self._thread.is_alive()):
+            return
+        self._thread = threading.Thread(target=self._ask, name="find-host", daemon=True)
+        with suppress(RuntimeError):  # no thread at this time: the next attempt asks
+            self._thread.start()
+
+    def _ask(self) -> None:
+        with suppress(ConnectError):  # unknown at this time
+            self.target = resolve(self._asked)
 
 
 def local_towards(server: Tuple[str, int]) -> str:

@@ -337,6 +337,7 @@ class Core(Commands):
         self._over = "is closed"
         self._udp_target: Optional[Tuple[str, int]] = None
         self._counts = Statistics()
+        self._connections_reported = 0
         self._ping_at = 0.0
         self._heartbeat_at = 0.0
         self._handshake_at = 0.0
@@ -512,6 +513,8 @@ class Core(Commands):
             if kind == _LOST:
                 self._held_at_loss.update(button for button, pressed in self.latest.pressed.items() if pressed)
                 self.latest = r.LatestReports()
+            else:
+                self._connections_reported += 1
             self._call("connection", r.ConnectionReport(arrived, kind == _CONNECTED, payload.decode()))
 
     def _handle_states(self, payload: bytes, stamp: float, arrived: float) -> None:
@@ -785,7 +788,9 @@ class Core(Commands):
         if len(contacts) > 16:
             raise ValueError(f"{len(contacts)} remote contacts: give the 16 nearest to the hand")
         numbers = [one for number, contact in enumerate(contacts) for one in _contact_numbers(number, contact)]
-        self._put_now(m.RemoteContacts(time.monotonic_ns(), self.latest.hand.tick_time_ns, numbers))
+        of_this_server = self._connections_reported == self._counts.connections
+        state_time_ns = self.latest.hand.tick_time_ns if of_this_server else 0
+        self._put_now(m.RemoteContacts(time.monotonic_ns(), state_time_ns, numbers))
 
     def _put_force(self, force_N: Numbers, torque_Nm: Numbers, lifetime_s: float) -> None:
         self._put_now(m.HeldForce(time.monotonic_ns(), force_N, torque_Nm, lifetime_s))

@@ -20,7 +20,8 @@ from collections import deque
 from contextlib import asynccontextmanager, suppress
 from contextvars import ContextVar
 from typing import (
-    TYPE_CHECKING, Any, AsyncIterator, Callable, Deque, Generator, List, NoReturn, Optional, Sequence, Set, Tuple, Type,
+    TYPE_CHECKING, Any, AsyncIterator, Awaitable, Callable, Coroutine, Deque, Generator, List, NoReturn, Optional, Sequence, Set,
+    Tuple, Type, Union,
 )  # fmt: skip
 
 import numpy as np
@@ -28,7 +29,7 @@ import numpy.typing as npt
 
 from . import _messages as m
 from . import reports as r
-from ._address import local_towards, parse, resolve
+from ._address import HostLookup, local_towards, parse
 from ._codec import Numbers
 from ._commands import function
 from ._core import (
@@ -132,6 +133,7 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
         client = reference()
         if client is None or client._finished or (client._counts.connections and not client.options.reconnect):
             return
+        client._host.ask_again()
         del client
         await asyncio.sleep(RETRY_S)
 
@@ -142,14 +144,15 @@ async def _attempt(reference: "weakref.ref[Client]") -> Optional[asyncio.Event]:
     if client is None:
         return None
     client._lost.clear()
-    lost, target, tcp_only = client._lost, client._target, client._address.tcp_only
+    client._target = client._host.target
+    lost, host, target, tcp_only = client._lost, client._host, client._target, client._address.tcp_only
     del client
     try:
         if tcp_only:
             attempt = asyncio.get_running_loop().create_connection(lambda: _Stream(reference, False), *target)
             await asyncio.wait_for(attempt, 3.0)
         else:
-            await _ask_for_connection(reference, target)
+            await _ask_for_connection(reference, host, target)
         return lost
     except asyncio.TimeoutError:
         failure = "no answer to the connection attempt"
@@ -163,7 +166,7 @@ async def _attempt(reference: "weakref.ref[Client]") -> Optional[asyncio.Event]:
     return None
 
 
-async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[str, int]) -> None:
+async def _ask_for_connection(reference: "weakref.ref[Client]", host: HostLookup, target: Tuple[str, int]) -> None:
     loop = asyncio.get_running_loop()
     local = local_towards(target)
     adopted = loop.create_future()
@@ -183,8 +186,12 @@ async def _ask_for_connection(reference: "weakref.ref[Client]", target: Tuple[st
             # A machine that changes its network has another address: the server cannot call it at the former one.
             if local_towards(target) != local:
                 raise OSError("this machine has another address now")  # the next attempt names it
+            if host.target != target:
+                raise OSError("the server has another address now")  # the next attempt asks there
             request.sendto(text)
             await asyncio.wait([adopted], timeout=1.0)
+            if not adopted.done():
+                host.ask_again()
     finally:
         server.close()
         if request is not None:
@@ -266,7 +273,8 @@ class Client(Core):
         return running is not self._loop and (running is not None or self._loop.is_running() or self._loop.is_closed())
 
     async def _start(self) -> None:
-        self._target = await self._loop.run_in_executor(None, resolve, self._address)
+        self._host = await self._loop.run_in_executor(None, HostLookup, self._address)
+        self._target = self._host.target  # of the attempt
         self._task = self._loop.create_task(_stay_connected(weakref.ref(self)))
         if self.options.connect_timeout > 0:
             try:
@@ -674,10 +682,35 @@ class Client(Core):
         self._set_subscription(kinds, rate_Hz)
         self._push()
 
-    async def stop_forces(self) -> None:
+    def stop_forces(self) -> "Coroutine[Any, Any, None]":
         """Brings the force of the device to zero within one tick of its arrival, until rearm_forces(); on a second
-        connection, too, while more than 64 KiB of this one may be ahead of it. Raises as
-        hapticd.Client.stop_forces()."""
+        connection, too, while more than 64 KiB of this one may be ahead of it. The call itself sends the stop; the
+        coroutine, which should be awaited, tells whether it arrives: it raises as hapticd.Client.stop_forces(). In
+        another thread than the event loop's, the call does nothing, and asyncio.run_coroutine_threadsafe() hands the
+        coroutine over."""
+        return self._stop() if self._is_used_elsewhere() else self._stopped(self._send_stop())
+
+    async def _stop(self) -> None:
+        await self._stopped(self._send_stop())
+
+    async def _stopped(self, sent: "Union[None, Exception, Awaitable[None]]") -> None:
+        if isinstance(sent, Exception):
+            raise sent
+        if sent is not None:
+            await sent
+        else:
+            self._check_arrival("forces not stopped")
+        await self._require(m.FEATURE_STOP, "stop the forces")
+
+    def _send_stop(self) -> "Union[None, Exception, Awaitable[None]]":
+        """The second connection, when it needs one; or the reason why nothing was sent, which must not keep a program from
+        its next call: the stop of another device, perhaps."""
+        try:
+            return self._put_stop()
+        except Exception as error:
+            return error
+
+    def _put_stop(self) -> "Optional[Awaitable[None]]":
         backlog = self._peer.stream_bytes if self._peer is not None else 0
         if self._transport is not None:
             backlog += self._transport.get_write_buffer_size()
@@ -689,11 +722,7 @@ class Client(Core):
         if not self._put_now(m.StopForces()):
             raise ConnectionLost(f"forces not stopped: {self._why_not_connected()}")
         self._push()
-        if behind:
-            await self._stop_beside(backlog)
-        else:
-            self._check_arrival("forces not stopped")
-        await self._require(m.FEATURE_STOP, "stop the forces")
+        return self._loop.create_task(self._stop_beside(backlog)) if behind else None
 
     def _send_at_once(self, message: Any, failure: str) -> None:
         if not self._put_now(message):

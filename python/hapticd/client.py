@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from . import _messages as m
 from . import reports as r
-from ._address import Address, local_towards, parse, resolve
+from ._address import Address, HostLookup, local_towards, parse
 from ._codec import Numbers
 from ._commands import function
 from ._core import (
@@ -124,7 +124,7 @@ class LossWatch:
 class Client(Core):
     """One device of one server: hapticd's own, or any other that speaks VRPN.
 
-    Thread: a client belongs to one thread and starts none. Several clients may live in several threads. A call while
+    Thread: a client belongs to one thread and starts none, except to look its host up anew while it has no connection. Several clients may live in several threads. A call while
     another thread polls or waits raises RuntimeError, but stop_forces() and close() may come from any thread.
 
     Callbacks run in poll() and what polls (run_for(), reports(), rows()), in the order of arrival. An exception of a
@@ -148,7 +148,8 @@ class Client(Core):
         self._inside = 0  # the thread that moves bytes or sleeps
         self._pushing = False
         super().__init__(address, options)
-        self._target = resolve(address)
+        self._host = HostLookup(address)
+        self._target = self._host.target  # of the attempt
         self._selector = selectors.DefaultSelector()
         self._sock: Optional[socket.socket] = None
         self._connecting = False
@@ -273,6 +274,7 @@ class Client(Core):
 
     def _attempt(self) -> None:
         self._retry_at = 0.0
+        self._target = self._host.target
         try:
             if self._address.tcp_only:
                 self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -348,6 +350,7 @@ class Client(Core):
         self._closed(reason)
         if self._counts.connections == 0 or self.options.reconnect:
             self._retry_at = time.monotonic() + RETRY_S
+            self._host.ask_again()
 
     # --- moving bytes
 
@@ -468,10 +471,13 @@ class Client(Core):
                     until = min(until, self._retry_at)
         if self._request is not None:
             if at >= self._request_at:
+                if self._request_at:
+                    self._host.ask_again()
                 self._request_at = at + 1.0
                 try:
                     # A machine that changes its network has another address: the server cannot call it at the former one.
-                    if local_towards(self._target) != self._request.getsockname()[0]:
+                    moved = local_towards(self._target) != self._request.getsockname()[0]
+                    if moved or self._host.target != self._target:
                         self._drop_sockets()
                         self._attempt()
                     else:

@@ -5,6 +5,7 @@ import pathlib
 import re
 import socket
 import subprocess
+import tempfile
 import threading
 import time
 from typing import Any, Dict, Iterator, List, Tuple
@@ -20,6 +21,8 @@ from hapticd._peer import Peer, TYPE_NAMES, now
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HAPTICD = os.environ.get("HAPTICD", str(ROOT / "build/release/bin/hapticd"))
+RUNTIME = tempfile.TemporaryDirectory()  # for the sockets of servers, which one that is killed leaves
+ENVIRONMENT = {**os.environ, "XDG_RUNTIME_DIR": RUNTIME.name}
 
 
 #: Every call of a client that commands, with arguments that are right.
@@ -110,6 +113,7 @@ class Server:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            env=ENVIRONMENT,
         )
         self.log: List[str] = []
         found = threading.Event()

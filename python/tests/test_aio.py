@@ -408,6 +408,43 @@ def test_a_stop_passes_a_large_upload(server: Server) -> None:
     run(main())
 
 
+@pytest.mark.parametrize("uploads", [False, True])
+def test_a_stop_acts_although_nobody_awaits_it(server: Server, uploads: bool) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as hand, hapticd.aio.connect(server.tcp) as other:
+            await hand.wait_capabilities()
+            upload = asyncio.ensure_future(hand.upload_mesh(0, *hapticd.sphere(25, rings=300))) if uploads else None
+            await asyncio.sleep(0)
+            stop = hand.stop_forces()
+            await until(other, lambda: other.latest.guard.stopped)
+            if upload is not None:
+                await upload
+                await stop  # else that of the second connection may follow the re-arm
+            await hand.rearm_forces()
+            await until(other, lambda: not other.latest.guard.stopped)
+            if upload is None:
+                before = hand.statistics().messages_out
+                await stop
+                assert hand.statistics().messages_out == before, "it does not stop again"
+
+    run(main())
+
+
+def test_one_stop_that_fails_does_not_keep_another_from_acting(server: Server) -> None:
+    async def main() -> None:
+        async with hapticd.aio.connect(server.tcp) as gone, hapticd.aio.connect(server.tcp) as hand:
+            await gone.close()
+            results = await asyncio.gather(gone.stop_forces(), hand.stop_forces(), return_exceptions=True)
+            assert isinstance(results[0], hapticd.ConnectionLost) and results[1] is None
+            await until(hand, lambda: hand.latest.guard.stopped)
+            task = asyncio.create_task(hand.stop_forces())
+            await asyncio.wait_for(task, 60)
+            await hand.rearm_forces()
+            await until(hand, lambda: not hand.latest.guard.stopped)
+
+    run(main())
+
+
 def test_who_stopped_re_arms_on_its_next_connection(server: Server) -> None:
     async def main() -> None:
         async with hapticd.aio.connect(server.tcp) as hand, hapticd.aio.connect(server.tcp) as other:

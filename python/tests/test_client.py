@@ -479,6 +479,60 @@ def test_requests_name_the_address_that_the_machine_has_now(monkeypatch: pytest.
     asyncio.run(run())
 
 
+def test_a_server_is_found_at_the_address_that_its_name_has_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And while the system takes long to say so, nothing waits for it, not even the end of the client."""
+    address, answer, asked = "127.0.0.1", threading.Event(), 0
+    system = socket.getaddrinfo
+
+    def getaddrinfo(host: Any, port: Any, *rest: Any, **more: Any) -> Any:
+        nonlocal asked
+        if host != "lab.example":
+            return system(host, port, *rest, **more)
+        asked += 1
+        if asked > 2:
+            answer.wait()
+        return system(address, port, *rest, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+
+    async def run(way: str) -> None:
+        nonlocal address, asked
+        address, asked = "127.0.0.1", 0
+        server = Server()
+        device = f"Phantom@{way}lab.example:{server.port}"
+        with hapticd.connect(device) as hand:
+            async with hapticd.aio.connect(device) as other:
+
+                async def both(condition: Any) -> None:
+                    deadline = time.monotonic() + 60
+                    while not condition():
+                        assert time.monotonic() < deadline
+                        hand.poll(0.01)
+                        await asyncio.sleep(0.01)
+
+                server.stop()
+                await both(lambda: not (hand.connected or other.connected))
+                await both(lambda: asked == 4)
+                server.start(f"127.0.0.1:{server.port}")
+                await both(lambda: hand.connected and other.connected)
+                assert asked == 4, "one lookup at a time"
+                server.stop()
+                await both(lambda: not (hand.connected or other.connected))
+                address = "127.0.0.2"
+                answer.set()
+                server.start(f"127.0.0.2:{server.port}")
+                await both(lambda: hand.connected and other.connected)
+                server.stop()
+                answer.clear()
+                await both(lambda: all(one._host._thread.is_alive() for one in (hand, other)))
+
+    try:
+        for way in ("tcp://", ""):
+            asyncio.run(run(way))
+    finally:
+        answer.set()
+
+
 def test_a_button_that_is_released_without_a_connection_is_reported_after_it() -> None:
     """Otherwise a program holds for ever what its user has let go."""
 
@@ -1022,6 +1076,29 @@ def test_a_client_ends_with_its_last_name(server: Server, way: str) -> None:
             until(watching, lambda: watching.latest.force.force_N[0] == 0)
         finally:
             gc.enable()
+
+
+def test_remote_contacts_name_no_state_of_an_earlier_server() -> None:
+    scripted = ScriptedServer()
+    number, layout = _NUMBERS[m.HandState]
+    with hapticd.connect(scripted.name) as hand:
+
+        def hears(time_ns: int) -> None:
+            scripted.answer = frame(5, 0, 0, number, layout.encode(m.HandState(9, time_ns)))
+            hand._ping()
+            until(hand, lambda: hand.latest.hand.tick_time_ns == time_ns)
+            scripted.answer = b""
+
+        hears(77)
+        hand._fail("lost")
+        hand.wait_connected(60)  # without a poll: the loss is not reported yet
+        hand.set_remote_contacts([])
+        hears(99)
+        hand.set_remote_contacts([])
+        hand.flush_all()
+    contacts = [m.LAYOUTS[_NUMBERS[m.RemoteContacts][0]].decode(data) for name, data in scripted.received if name == "hapticd Remote_Contacts"]
+    assert [one.state_time for one in contacts] == [0, 99]
+    scripted.close()
 
 
 @pytest.mark.parametrize("closes", [True, False])

@@ -91,7 +91,10 @@ class SystemBlockingThread final : public BlockingThread::Impl {
           applyOptions(options);
           body();
         }) {}
-  ~SystemBlockingThread() override { thread_.join(); }
+  ~SystemBlockingThread() override {
+    if (thread_.joinable()) thread_.join();
+  }
+  void detach() noexcept override { thread_.detach(); }
 
  private:
   std::thread thread_;

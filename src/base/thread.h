@@ -93,6 +93,7 @@ class BlockingThread {
   class Impl {
    public:
     virtual ~Impl() = default;
+    virtual void detach() noexcept = 0;
   };
 
   BlockingThread() noexcept = default;
@@ -102,6 +103,11 @@ class BlockingThread {
   bool running() const noexcept { return impl_ != nullptr; }
   /// Waits for the body to return. Idempotent.
   void join() { impl_.reset(); }
+  /// Waits for nothing: the thread ends with its body, which must own all that it uses, or with the process.
+  void detach() noexcept {
+    if (impl_) impl_->detach();
+    impl_.reset();
+  }
 
  private:
   std::unique_ptr<Impl> impl_;

@@ -235,8 +235,9 @@ void Client::setRemoteContacts(std::span<const RemoteContact> contacts) {
                                 " contacts; give the 16 nearest to the hand");
   }
   if (connected()) impl_->require(wire::kFeatureRemoteContacts, "stream contacts");
-  wire::RemoteContacts message{
-      .time = base::now(), .stateTime = impl_->latest.hand.tickTime.count(), .contacts = {}};
+  const bool isOfThisServer = impl_->connectionsReported == impl_->link.connectionNumber();
+  const std::int64_t stateTime = isOfThisServer ? impl_->latest.hand.tickTime.count() : 0;
+  wire::RemoteContacts message{.time = base::now(), .stateTime = stateTime, .contacts = {}};
   std::vector<double>& numbers = message.contacts.values;
   numbers.reserve(contacts.size() * wire::RemoteContacts::kNumbers);
   for (const RemoteContact& c : contacts) {

@@ -95,7 +95,8 @@ struct HAPTICD_HIDDEN Client::Impl {
   const std::uint64_t key;              // by which the server knows the connections of this client; not 0
   bool heartbeats = false;
   net::Subscription heartbeatTimer;
-  LatestReports latest;
+  LatestReports latest;  // of the connection that was reported last, which may have been followed by another
+  std::uint64_t connectionsReported = 0;
   std::set<int> heldAtLoss;  // buttons that were down when a connection ended; until the next states
   std::array<ReportStatistics, kReportKinds> reports{};
   std::uint64_t damaged = 0;

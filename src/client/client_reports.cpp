@@ -176,6 +176,8 @@ void Client::Impl::dispatch(const Arrival& arrival) {
       if (pressed) heldAtLoss.insert(button);
     }
     latest = {};
+  } else {
+    ++connectionsReported;
   }
   callbacksFor<ConnectionReport>().call({arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
 }

@@ -47,7 +47,7 @@ std::chrono::system_clock::time_point wallTimePoint() {
 
 Link::Link(const ServerAddress& server, const LinkOptions& options) try
     : process_(::getpid()), server_(server), options_(options) {
-  if (server_.socket.empty()) address_ = {net::resolve(server_.host), server_.port};
+  if (server_.socket.empty()) address_ = {host_.emplace(server_.host).address(), server_.port};
   loop_.setErrorHandler([this](std::string_view text) { lastFailure_ = text; });
   attempt();
 } catch (const net::Error& error) {  // also of the loop
@@ -101,7 +101,7 @@ void Link::attempt() {
       adopt(net::Connection::connect(loop_, address_, kHandshakeTimeout, connectionOptions(options_)));
     } else {
       reverseConnection_.emplace(
-          loop_, address_, connectionOptions(options_),
+          loop_, address_, [this] { return renewedAddress(); }, connectionOptions(options_),
           [this](net::Connection connection) {
             reverseConnection_.reset();
             adopt(std::move(connection));
@@ -116,8 +116,18 @@ void Link::attempt() {
 
 void Link::retryLater() {
   if (connections_ == 0 || options_.reconnect) {
-    retryTimer_ = loop_.after(options_.retryInterval, [this] { attempt(); });
+    if (host_) host_->askAgain();
+    retryTimer_ = loop_.after(options_.retryInterval, [this] {
+      if (host_) address_.address = host_->address();
+      attempt();
+    });
   }
+}
+
+const net::Endpoint& Link::renewedAddress() {
+  address_.address = host_->address();
+  host_->askAgain();
+  return address_;
 }
 
 void Link::adopt(net::Connection connection) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "client/host_lookup.h"
 #include "client/inbox.h"
 #include "client/reverse_connection.h"
 #include "client/server_address.h"
@@ -57,7 +58,8 @@ class Link {
   using Handler = std::function<void(const Arrival&)>;
   static constexpr std::chrono::hours kLongestWait{24};  ///< A deadline must not overflow.
 
-  /// Resolves the host, which may block, and starts to connect. Throws ConnectError for an unknown host.
+  /// Resolves the host, which may block, and starts to connect; later attempts look it up anew, without
+  /// blocking. Throws ConnectError for an unknown host.
   Link(const ServerAddress& server, const LinkOptions& options);
   /// Sends what is collected and waits until the server has received it and ended the connection; up to
   /// kEndTimeout for one that has received everything, and endSendTimeout while it receives nothing.
@@ -188,6 +190,8 @@ class Link {
   /// Whether the handshake is complete, on a connection that may have failed since.
   bool handshakeDone() const noexcept { return peer_ && peer_->connected(); }
   void attempt();
+  /// The address by the last answer of the system, which is asked again for the next call.
+  const net::Endpoint& renewedAddress();
   void retryLater();
   void adopt(net::Connection connection);
   std::optional<wire::UdpAddress> openDatagrams(const net::Endpoint& local);
@@ -211,6 +215,7 @@ class Link {
   const int process_;
   ServerAddress server_;
   LinkOptions options_;
+  std::optional<HostLookup> host_;  // none: a socket of this machine
   net::Endpoint address_;
   net::Loop loop_;
   wire::LocalNames names_;

@@ -9,6 +9,7 @@
 namespace hapticd::client {
 
 ReverseConnection::ReverseConnection(net::Loop& loop, const net::Endpoint& server,
+                                     std::function<net::Endpoint()> serverNow,
                                      const net::ConnectionOptions& options,
                                      std::function<void(net::Connection)> onConnection,
                                      std::function<void()> onRefused)
@@ -19,7 +20,13 @@ ReverseConnection::ReverseConnection(net::Loop& loop, const net::Endpoint& serve
       onRefused_(std::move(onRefused)) {
   open(net::localAddressTowards(server_.addressText()));
   // Repeat the request: a datagram may be lost, and busy servers ignore some.
-  timer_ = loop_.every(std::chrono::seconds(1), [this] { request(); });
+  timer_ = loop_.every(std::chrono::seconds(1), [this, serverNow = std::move(serverNow)] {
+    if (const net::Endpoint now = serverNow(); now != server_) {
+      server_ = now;
+      address_ = 0;  // the socket is connected to the former one
+    }
+    request();
+  });
   request();
 }
 

@@ -10,20 +10,21 @@
 
 namespace hapticd::client {
 
-/// Asks a server for a connection every second until it is destroyed, from the address that this machine has
-/// at that time. Thread: that of the loop. Its callbacks may destroy it.
+/// Asks a server for a connection every second until it is destroyed, at the address that the server has at
+/// that time and from the one that this machine has. Thread: that of the loop. Its callbacks may destroy it.
 class ReverseConnection {
  public:
   /// Throws net::Error when there is no route to the server or no socket.
-  ReverseConnection(net::Loop& loop, const net::Endpoint& server, const net::ConnectionOptions& options,
-                    std::function<void(net::Connection)> onConnection, std::function<void()> onRefused);
+  ReverseConnection(net::Loop& loop, const net::Endpoint& server, std::function<net::Endpoint()> serverNow,
+                    const net::ConnectionOptions& options, std::function<void(net::Connection)> onConnection,
+                    std::function<void()> onRefused);
 
  private:
   void open(std::uint32_t address);
   void request();
 
   net::Loop& loop_;
-  const net::Endpoint server_;
+  net::Endpoint server_;
   const net::ConnectionOptions options_;
   const std::function<void(net::Connection)> onConnection_;
   const std::function<void()> onRefused_;

@@ -74,7 +74,7 @@ std::optional<fs::path> findServerSocket(const Endpoint& server, bool anyUser) {
     }
   }
   for (const fs::path& candidate : candidates) {
-    if (isTrusted(candidate, anyUser && geteuid() == 0)) return candidate;
+    if (isTrusted(candidate, anyUser && geteuid() == 0) && !isAbandoned(candidate)) return candidate;
   }
   return std::nullopt;
 }

@@ -42,8 +42,8 @@ Connection connectLocal(Loop& loop, const std::filesystem::path& path, const Con
 /// may have the port there.
 std::filesystem::path defaultSocketPath(const Endpoint& listening);
 /// The socket of a server of this user that listens on that address, or of the system's service; nothing when
-/// there is none, or when somebody else could have put it there. With `anyUser`, root also finds those of all
-/// users, whom it then trusts.
+/// there is none, or when somebody else could have put it there. Passes over what servers left that were
+/// killed. With `anyUser`, root also finds those of all users, whom it then trusts.
 std::optional<std::filesystem::path> findServerSocket(const Endpoint& server, bool anyUser = false);
 
 }  // namespace hapticd::net

@@ -95,14 +95,18 @@ int listenAt(const fs::path& path) {
     if (::lstat(path.c_str(), &there) == 0 && !S_ISSOCK(there.st_mode))
       throw Error(path.string() +
                   " exists and is no socket: choose another path by socket in the configuration");
-    const Descriptor probe = openSocket(path);
-    if (connect(probe.fd(), path) != ECONNREFUSED) fail(path, EADDRINUSE);
-    ::unlink(path.c_str());  // of a server that was killed
+    if (!isAbandoned(path)) fail(path, EADDRINUSE);
+    ::unlink(path.c_str());
     if (!bind()) fail(path, errno);
   }
   ::chmod(path.c_str(), 0666);
   if (::listen(descriptor.fd(), kBacklog) != 0) fail(path, errno);
   return descriptor.release();
+}
+
+bool isAbandoned(const fs::path& path) {
+  const Descriptor probe = openSocket(path);
+  return connect(probe.fd(), path) == ECONNREFUSED;
 }
 
 int connectTo(const fs::path& path) {

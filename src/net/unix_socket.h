@@ -15,6 +15,8 @@ inline constexpr std::size_t kLongestSocketPath = 107;
 int listenAt(const std::filesystem::path& path);
 /// A socket that is connected to the one that listens there. Throws Error.
 int connectTo(const std::filesystem::path& path);
+/// Whether a server left the socket at this path when it was killed. Throws Error.
+bool isAbandoned(const std::filesystem::path& path);
 /// The user at the other end of a Unix socket; nothing for other descriptors.
 std::optional<std::uint32_t> userBehind(int fd) noexcept;
 /// Of a file or folder, not of what a link leads to; nothing when there is none.

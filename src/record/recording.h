@@ -110,7 +110,7 @@ struct TickEvent {
 /// A client marked a moment.
 struct MarkerEvent {
   Nanos time = 0;
-  std::string text;
+  std::string text;  ///< as the client sent it; from a reader, UTF-8
 };
 
 /// Data is missing here because the disk was too slow.

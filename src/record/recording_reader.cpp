@@ -186,7 +186,7 @@ bool RecordingReader::readBlock(RecordingEvent& event) {
       return false;
     case BlockKind::marker:
       takeWhole<MarkerEvent>(event);
-      std::get<MarkerEvent>(event).text = base::printable(std::get<MarkerEvent>(event).text);
+      std::get<MarkerEvent>(event).text = base::utf8(std::get<MarkerEvent>(event).text);
       return true;
     case BlockKind::end:
       takeWhole<EndEvent>(event);

@@ -59,27 +59,31 @@ Box boundsOf(const BoxedTriangles& all) {
   return {low.head<3>().matrix().cast<double>(), high.head<3>().matrix().cast<double>()};
 }
 
+// Embree calls it an unknown error, 1, when it gets no thread, or no memory for one.
+std::string reasonOf(RTCError error) {
+  if (error == RTC_ERROR_OUT_OF_MEMORY) return "out of memory; raise the limit ('ulimit -v')";
+  const std::string number = "Embree error " + std::to_string(error);
+  if (std::getenv("HAPTICD_EMBREE") != nullptr)
+    return number + "; check the HAPTICD_EMBREE environment variable";
+  return number + "; raise the limits ('ulimit -v' and 'ulimit -u')";
+}
+
 RTCDevice device() {
   // One device for the process; Embree keeps its settings and error state there. HAPTICD_EMBREE passes
   // Embree's own options through, e.g. "threads=1" or "isa=sse4.2" for repeatable instruction counts.
   static RTCDevice theDevice = [] {
     const char* config = std::getenv("HAPTICD_EMBREE");
     RTCDevice created = rtcNewDevice(config);
-    if (created == nullptr) {
-      const RTCError error = rtcGetDeviceError(nullptr);
-      if (error == RTC_ERROR_OUT_OF_MEMORY)
-        throw std::runtime_error("Embree did not start: out of memory; raise the limit ('ulimit -v')");
-      throw std::runtime_error("Embree did not start (error " + std::to_string(error) +
-                               "); check the HAPTICD_EMBREE environment variable");
-    }
+    if (created == nullptr)
+      throw std::runtime_error("Embree did not start: " + reasonOf(rtcGetDeviceError(nullptr)));
     return created;
   }();
   return theDevice;
 }
 
 [[noreturn]] void fail(const char* what) {
-  throw std::runtime_error(std::string("spatial index: ") + what + " failed, Embree error " +
-                           std::to_string(rtcGetDeviceError(device())));
+  throw std::runtime_error(std::string("spatial index: ") + what +
+                           " failed: " + reasonOf(rtcGetDeviceError(device())));
 }
 
 struct NearQuery {
@@ -264,9 +268,8 @@ struct SpatialIndex::Tree {
     rtcCommitScene(scene);
     boxOf = nullptr;
     boxed = nullptr;
-    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE) {
-      throw std::runtime_error("spatial index: Embree error " + std::to_string(error));
-    }
+    if (const RTCError error = rtcGetDeviceError(device()); error != RTC_ERROR_NONE)
+      throw std::runtime_error("spatial index: " + reasonOf(error));
   }
 };
 

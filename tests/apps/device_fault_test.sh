@@ -24,10 +24,14 @@ await 'Connection refused' device.log
 
 "$hapticd" mark "trial 3 begins" --server "$name" >"$work/out" 2>"$work/err" || { cat "$work/out" "$work/err"; exit 1; }
 grep -q 'marked "trial 3 begins"' "$work/out"
+"$hapticd" mark $'red\e[31mtext' --server "$name" >/dev/null 2>&1
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "$name" --seconds 1 >"$work/out" 2>"$work/err" ||
   { cat "$work/out" "$work/err"; exit 1; }
 grep -q '^summary' "$work/out"
 grep -q 'the device gives no force: .*Connection refused' "$work/err"
 kill "$device"
 wait "$device"
-"$hapticd" info "$work/felt.haptics" | grep -q 'marker .*trial 3 begins'
+"$hapticd" info "$work/felt.haptics" >"$work/info"
+grep -q 'marker .*trial 3 begins' "$work/info"
+grep -q 'marker .*red.*text' "$work/info"
+! grep -q $'\e' "$work/info" || exit 1

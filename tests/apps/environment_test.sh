@@ -30,6 +30,15 @@ serves "empty environment" env -i
 serves "no temporary folder" env TMPDIR=/nowhere XDG_RUNTIME_DIR=/nowhere XDG_STATE_HOME=/nowhere HOME=/nowhere
 serves "standard streams closed" bash -c 'exec 0<&- 1>&- 2>&-; exec "$@"' -
 
+# What Embree calls an unknown error is a lack of memory for its threads: the text names the limit. Where it begins depends on
+# the machine.
+"$hapticd" export "$work/r.haptics" --to csv --out "$work/hand.csv" --force >/dev/null
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >"$work/one.obj"
+for kB in $(seq 200000 4000 228000); do
+  limited -v "$kB" "$hapticd" render --mesh "$work/one.obj" --hand "$work/hand.csv" --out "$work/felt.csv" --force >"$work/said" 2>&1 || true
+  ! grep Embree "$work/said" | grep -v "raise the limit" || exit 1
+done
+
 # What is printed to a closed standard output is lost, which a script must hear of.
 "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt >"$work/log" 2>&1 &
 server=$!

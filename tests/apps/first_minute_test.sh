@@ -46,6 +46,11 @@ without_rights self-test --seconds 0.2
 
 "$hapticd" --version | head -1 | grep -qE '^hapticd [0-9]+\.[0-9]+\.[0-9]+ \(.+\)$'
 "$hapticd" manual "$work/share"
+: >"$work/file"
+for folder in "$work/file" /proc; do # where nothing can be written, not even by root
+  ! "$hapticd" manual "$folder" 2>"$work/said" || exit 1
+  grep -q "^hapticd: cannot write '$folder/man/man1/hapticd.1': .*; name a folder that can be written" "$work/said" || { cat "$work/said"; exit 1; }
+done
 for command in $("$hapticd" --help | sed -nE '/^Subcommands/,$ s/^  ([a-z-]+) .*/\1/p'); do
   [ "$command" = device-host ] || [ -s "$work/share/man/man1/hapticd-$command.1" ] || { echo "no page of $command"; exit 1; }
 done

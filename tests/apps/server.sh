@@ -3,6 +3,7 @@
 # used), $server (the process id) and $address, and has the function await.
 [ -v serve_options ] || serve_options=(--http off)
 work=${work:-$(mktemp -d)}
+export XDG_RUNTIME_DIR=$work # for its socket, which a server that is killed leaves
 : >"$work/log" # so that it exists before the server writes to it
 "$hapticd" serve --listen 127.0.0.1:0 --allow-no-rt "${serve_options[@]}" >"$work/log" 2>&1 &
 server=$!

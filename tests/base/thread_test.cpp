@@ -303,6 +303,25 @@ TEST(BlockingThread, DestructionAndMoveWaitForTheBody) {
   EXPECT_EQ(ended, 3);
 }
 
+TEST(BlockingThread, ADetachedOneIsNotWaitedFor) {
+  struct Shared {
+    std::binary_semaphore end{0};
+    std::binary_semaphore ended{0};
+  };
+  const auto shared = std::make_shared<Shared>();
+  {
+    BlockingThread thread({"long"}, [shared] {
+      shared->end.acquire();
+      shared->ended.release();
+    });
+    thread.detach();
+    EXPECT_FALSE(thread.running());
+    thread.detach();
+  }
+  shared->end.release();
+  shared->ended.acquire();
+}
+
 // A stack that no machine has: the kernel answers as to a lack of memory or processes.
 TEST(SystemThreads, ARefusalNamesTheThreadAndTheRemedy) {
   pthread_attr_t usual;

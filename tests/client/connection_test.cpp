@@ -3,7 +3,9 @@
 
 #include <time.h>
 
+#include <atomic>
 #include <cerrno>
+#include <semaphore>
 #include <system_error>
 #include <thread>
 
@@ -225,6 +227,72 @@ TEST(Client, ItsRequestsNameTheAddressThatItsMachineHasNow) {
       net::Connection::connect(loop, net::Endpoint::parse(request->host, request->port), 2s);
   call.start({.onConnected = [&] { called = true; }});
   EXPECT_TRUE(until([&] { return called; })) << "it listens there";
+}
+
+/// The system's network with one more name, whose address changes, and whose later lookups may take long.
+class Naming final : public net::Network {
+ public:
+  std::unique_ptr<net::Loop::Impl> makeLoop() override { return system_.makeLoop(); }
+  std::uint32_t resolve(const std::string& host) override {
+    if (host != "lab.example") return system_.resolve(host);
+    if (++asked_ > 1 && slow) {
+      ++waiting;
+      answer.acquire();
+      --waiting;
+    }
+    if (address == 0) throw net::Error("cannot find host '" + host + "'");
+    return address;
+  }
+  std::uint32_t localAddressTowards(const std::string& host) override {
+    return system_.localAddressTowards(host);
+  }
+  std::atomic<std::uint32_t> address{net::kLoopbackAddress};
+  std::atomic<bool> slow{false};
+  std::atomic<int> waiting{0};
+  std::counting_semaphore<> answer{0};
+
+ private:
+  net::Network& system_ = net::network();
+  std::atomic<int> asked_{0};
+};
+
+// A lookup that nobody waits for may outlive its test.
+Naming& newNames() {
+  static auto& all = *new std::vector<std::unique_ptr<Naming>>;
+  return *all.emplace_back(std::make_unique<Naming>());
+}
+
+TEST_P(BothWays, AServerIsFoundAtTheAddressThatItsNameHasNow) {
+  Naming& names = newNames();
+  const net::ScopedNetwork scope(names);
+  auto server = std::make_unique<ScriptedServer>();
+  const std::uint16_t port = server->port();
+  Client client((tcpOnly() ? "Phantom@tcp://lab.example:" : "Phantom@lab.example:") + std::to_string(port));
+  server.reset();
+  ASSERT_TRUE(pollUntil(client, [&] { return !client.connected(); }));
+  names.address = 0;
+  client.runFor(600ms);  // more than two attempts of TCP
+  names.address = net::kLoopbackAddress + 1;
+  server = std::make_unique<ScriptedServer>(
+      ScriptedServerOptions{.port = port, .address = net::kLoopbackAddress + 1});
+  EXPECT_TRUE(pollUntil(client, [&] { return client.connected(); }));
+}
+
+TEST_P(BothWays, ANameThatIsLookedUpForLongHoldsNothingUp) {
+  Naming& names = newNames();
+  names.slow = true;
+  const net::ScopedNetwork scope(names);
+  auto server = std::make_unique<ScriptedServer>();
+  const std::uint16_t port = server->port();
+  {
+    Client client((tcpOnly() ? "Phantom@tcp://lab.example:" : "Phantom@lab.example:") + std::to_string(port));
+    server.reset();
+    ASSERT_TRUE(pollUntil(client, [&] { return names.waiting > 0; }));
+    server = std::make_unique<ScriptedServer>(ScriptedServerOptions{.port = port});
+    EXPECT_TRUE(pollUntil(client, [&] { return client.connected(); }));
+    EXPECT_EQ(names.waiting, 1) << "one lookup at a time";
+  }
+  names.answer.release();
 }
 
 TEST(Client, KeepsCommandsBeforeTheFirstConnection) {

@@ -448,6 +448,28 @@ TEST_P(BothWays, StreamedStateIsSentAtOnce) {
   EXPECT_THAT(textOf<std::invalid_argument>([&] { client.setRemoteContacts(many); }), HasSubstr("17"));
 }
 
+TEST(Extensions, RemoteContactsNameNoStateOfAnEarlierServer) {
+  ScriptedServer server({.capabilities = allCapabilities()});
+  Client client(server.tcpName());
+  wire::HandState state;
+  state.time = 77;
+  server.send(state);
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().hand.tickTime.count() == 77; }));
+  server.dropClients();
+  EXPECT_THROW(client.stopForces(), ConnectionLost);
+  client.waitConnected(kPatience);  // without a poll: the loss is not reported yet
+  client.setRemoteContacts({});
+  state.time = 99;
+  server.send(state);
+  ASSERT_TRUE(pollUntil(client, [&] { return client.latest().hand.tickTime.count() == 99; }));
+  client.setRemoteContacts({});
+  std::vector<std::int64_t> times;
+  for (const Received& one : server.waitReceived(2)) {
+    if (const auto* contacts = one.message.as<wire::RemoteContacts>()) times.push_back(contacts->stateTime);
+  }
+  EXPECT_EQ(times, (std::vector<std::int64_t>{0, 99}));
+}
+
 TEST(Extensions, WithoutRemoteContactsTheCallsThrow) {
   ScriptedServer server(ableBut(wire::kFeatureRemoteContacts));
   Client client(server.name());

@@ -38,10 +38,10 @@ void ScriptedServer::openPort() {
   for (int attempt = 0;; ++attempt) {
     try {
       listener_ = std::make_unique<net::TcpListener>(
-          loop_, net::Endpoint{net::kLoopbackAddress, options_.port},
+          loop_, net::Endpoint{options_.address, options_.port},
           [this](net::Connection connection) { serve(std::move(connection), false); });
       port_ = listener_->local().port;
-      requests_ = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, port_});
+      requests_ = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{options_.address, port_});
       break;
     } catch (const net::Error&) {
       if (attempt == 20) throw;
@@ -65,7 +65,7 @@ void ScriptedServer::serve(net::Connection connection, bool withDatagrams) {
   if (options_.greetingBytes.empty()) {
     wire::PeerOptions peerOptions;
     if (withDatagrams) {
-      session->udp = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{net::kLoopbackAddress, 0});
+      session->udp = std::make_unique<net::UdpSocket>(loop_, net::Endpoint{options_.address, 0});
       session->udp->start({.onDatagram =
                                [this, session](auto bytes, const net::Endpoint&) {
                                  session->peer->feedDatagram(

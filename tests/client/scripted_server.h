@@ -25,6 +25,7 @@ namespace hapticd::test {
 struct ScriptedServerOptions {
   std::string device = "Phantom";
   std::uint16_t port = 0;  ///< 0: the system chooses
+  std::uint32_t address = net::kLoopbackAddress;
   bool answersPings = true;
   bool reads = true;                                 ///< false: completes the handshake, then does not read
   std::optional<wire::Capabilities> capabilities{};  ///< the answer to QueryCapabilities, if set

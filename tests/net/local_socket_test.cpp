@@ -71,6 +71,27 @@ TEST_F(LocalSocket, IsFoundInTheFolderOfASessionThatTheEnvironmentDoesNotName) {
   if (made) std::filesystem::remove_all(madeBoth ? sessions : session);
 }
 
+// Of a server that was killed, in a session, for example; the new one runs as a service.
+TEST_F(LocalSocket, OneThatNobodyListensAtIsNotFound) {
+  const Endpoint listening{kLoopbackAddress, 1};
+  const char* const before = std::getenv("XDG_RUNTIME_DIR");
+  const std::string runtime = before != nullptr ? before : "";
+  ::setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
+  const std::filesystem::path path = defaultSocketPath(listening);
+  {
+    const LocalListener listener(loop_, path, [](Connection) {});
+    EXPECT_EQ(findServerSocket(listening), path);
+    std::filesystem::rename(path, path.string() + "x");
+  }
+  std::filesystem::rename(path.string() + "x", path);
+  EXPECT_NE(findServerSocket(listening), path);
+  {
+    const LocalListener listener(loop_, path, [](Connection) {});
+    EXPECT_EQ(findServerSocket(listening), path) << "a new server takes its place";
+  }
+  before != nullptr ? ::setenv("XDG_RUNTIME_DIR", runtime.c_str(), 1) : ::unsetenv("XDG_RUNTIME_DIR");
+}
+
 #ifndef HAPTICD_SANITIZED
 // Another listener takes each descriptor that becomes free.
 TEST_F(LocalSocket, OutOfDescriptorsItTellsAndAcceptsLater) {

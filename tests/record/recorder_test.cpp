@@ -16,6 +16,7 @@
 #include "base/fake_world.h"
 #include "record/recording_file.h"
 #include "record/recording_reader.h"
+#include "record/sidecar.h"
 
 namespace hapticd::record {
 namespace {
@@ -123,7 +124,7 @@ TEST(Recorder, MarkersAreKept) {
   recorder.addDevice(phantom());
   recorder.start(0, "");
   recorder.recordMarker(77, "trial 3 begins");
-  // For terminals, XML and JSON: no control characters, and nothing that is not UTF-8.
+  // For XML and JSON: nothing that is not UTF-8.
   recorder.recordMarker(78, "20 \xe2\x84\x83, \xf0\x9f\x98\x80");
   recorder.recordMarker(79,
                         "a\x1b[2Jb\nc\xe9"
@@ -139,7 +140,8 @@ TEST(Recorder, MarkersAreKept) {
   EXPECT_EQ(markers[0].text, "trial 3 begins");
   EXPECT_EQ(markers[1].text, "20 \xe2\x84\x83, \xf0\x9f\x98\x80");
   const std::string no = "\xef\xbf\xbd";
-  EXPECT_EQ(markers[2].text, "a" + no + "[2Jb" + no + "c" + no + "d" + no + no + no + no + no + no + no);
+  EXPECT_EQ(markers[2].text, "a\x1b[2Jb\nc" + no + "d" + no + no + no + no + no + no + no);
+  EXPECT_NE(sidecarOf(file.path()).json.find(R"("a\u001b[2Jb\nc)"), std::string::npos);
 }
 
 TEST(Recorder, AFileThatIsRemovedEndsTheRecording) {

@@ -14,6 +14,7 @@
 #include <regex>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 
 extern char** environ;
@@ -81,10 +82,15 @@ ServerProcess::ServerProcess(const WorkDirectory& work, const std::vector<std::s
     : log_(work.file("log")) {
   std::vector<std::string> words{HAPTICD, "serve", "--listen", "127.0.0.1:0", "--allow-no-rt"};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<std::string> settings{"XDG_STATE_HOME=" + work.file("state")};
+  // The destructor kills the server, which then leaves its socket.
+  std::vector<std::string> settings{"XDG_STATE_HOME=" + work.file("state"),
+                                    "XDG_RUNTIME_DIR=" + work.file("")};
   settings.insert(settings.end(), environment.begin(), environment.end());
   for (char** setting = environ; *setting != nullptr; ++setting) {
-    if (std::strncmp(*setting, "XDG_STATE_HOME=", 15) != 0) settings.emplace_back(*setting);
+    const std::string_view text = *setting;
+    const auto is = [&](const char* name) { return text.starts_with(name); };
+    if (!is("XDG_STATE_HOME=") && !is("XDG_RUNTIME_DIR=") && !is("RUNTIME_DIRECTORY="))
+      settings.emplace_back(text);
   }
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);
