@@ -22,7 +22,6 @@ from hapticd._peer import Peer, TYPE_NAMES, now
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HAPTICD = os.environ.get("HAPTICD", str(ROOT / "build/release/bin/hapticd"))
 RUNTIME = tempfile.TemporaryDirectory()  # for the sockets of servers, which one that is killed leaves
-ENVIRONMENT = {**os.environ, "XDG_RUNTIME_DIR": RUNTIME.name}
 
 
 #: Every call of a client that commands, with arguments that are right.
@@ -113,7 +112,7 @@ class Server:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=ENVIRONMENT,
+            env={**os.environ, "XDG_RUNTIME_DIR": RUNTIME.name},
         )
         self.log: List[str] = []
         found = threading.Event()

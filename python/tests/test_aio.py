@@ -565,9 +565,9 @@ def test_a_stop_that_nothing_receives_raises(way: str) -> None:
 def test_errors() -> None:
     async def main() -> None:
         with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
-            await hapticd.aio.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=0.3)
+            await hapticd.aio.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=2)
         with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1:1 "):
-            await hapticd.aio.connect("Phantom@127.0.0.1:1", connect_timeout=0.3)
+            await hapticd.aio.connect("Phantom@127.0.0.1:1", connect_timeout=2)
         scripted = ScriptedServer(extensions=False)
         async with hapticd.aio.connect(scripted.name) as hand:
             with pytest.raises(hapticd.Unsupported, match="without the extensions"):

@@ -98,10 +98,11 @@ TEST_F(InContact, ASecondPullOfTheCableIsNoticedWithoutAnError) {
 
 #ifndef HAPTICD_SANITIZED  // the program of sanitized builds only serves
 
-// Its status, and what it printed.
-std::pair<int, std::string> commandOf(const std::string& arguments) {
+// Of a command on the machine of the server in `work`: its status, and what it printed.
+std::pair<int, std::string> commandOf(const WorkDirectory& work, const std::string& arguments) {
+  const std::string environment = "XDG_RUNTIME_DIR=" + work.file("") + " ";
   std::string text;
-  FILE* const output = popen((std::string(HAPTICD) + " " + arguments + " 2>&1").c_str(), "r");
+  FILE* const output = popen((environment + HAPTICD + " " + arguments + " 2>&1").c_str(), "r");
   for (int c = std::fgetc(output); c != EOF; c = std::fgetc(output)) text += static_cast<char>(c);
   return {WEXITSTATUS(pclose(output)), text};
 }
@@ -112,17 +113,17 @@ TEST_F(InContact, TheStopCommandTellsAFaultFromARefusal) {
   const std::string device = "Phantom@" + server->address();
   strike(mock::kWarmMotors, 1);
   expectWords("too hot");
-  auto [status, text] = commandOf("stop " + device);
+  auto [status, text] = commandOf(work, "stop " + device);
   EXPECT_EQ(status, 0) << text;
   EXPECT_THAT(text, HasSubstr("forces are off"));
-  std::tie(status, text) = commandOf("stop --rearm " + device);
+  std::tie(status, text) = commandOf(work, "stop --rearm " + device);
   EXPECT_EQ(status, 0) << text;
   EXPECT_THAT(text, HasSubstr("too hot"));
   EXPECT_THAT(text, HasSubstr("forces come back once the device gives them"));
   heal(false);
-  std::tie(status, text) = commandOf("stop " + device);
+  std::tie(status, text) = commandOf(work, "stop " + device);
   EXPECT_EQ(status, 0) << text;
-  std::tie(status, text) = commandOf("stop --rearm " + device);
+  std::tie(status, text) = commandOf(work, "stop --rearm " + device);
   EXPECT_EQ(status, 0) << text;
   EXPECT_THAT(text, HasSubstr("forces ramp in"));
   touch();
