@@ -124,8 +124,9 @@ class LossWatch:
 class Client(Core):
     """One device of one server: hapticd's own, or any other that speaks VRPN.
 
-    Thread: a client belongs to one thread and starts none, except to look its host up anew while it has no connection. Several clients may live in several threads. A call while
-    another thread polls or waits raises RuntimeError, but stop_forces() and close() may come from any thread.
+    Thread: a client belongs to one thread and starts none, except to look its host up anew while it has no connection.
+    Several clients may live in several threads. A call while another thread polls or waits raises RuntimeError, but
+    stop_forces() and close() may come from any thread.
 
     Callbacks run in poll() and what polls (run_for(), reports(), rows()), in the order of arrival. An exception of a
     callback leaves poll() when the other callbacks have had the report; the remaining reports follow in the next poll(). A
