@@ -81,7 +81,7 @@ void IsolatedDevice::open() {
     throw;
   }
   profile_.transportDelay_s += kOneTick_s;
-  silent_ = lostThere_ = answered_ = false;
+  silent_ = lostThere_ = told_ = false;
 }
 
 void IsolatedDevice::spawn(int socketOfChild) {
@@ -150,6 +150,7 @@ void IsolatedDevice::send(const std::string& request) const {
   ++unanswered_;
   asked_ = base::now();
   faultAsked_ = request == kFault;
+  askedWhileLost_ = lostThere_;
 }
 
 // Answers come in the order of the requests, and those to requests that timed out come first. A driver tells
@@ -293,12 +294,12 @@ std::string IsolatedDevice::faultText() const {
   if (unanswered_ == 0 || !faultAsked_) send(kFault);
   try {
     fault_ = takeAnswers(base::now() + kGlance_ms * kMillisecond, Wait::toTheEnd);
-    answered_ = true;
+    told_ = askedWhileLost_;
     const std::string late = std::exchange(late_, {});
     if (fault_->empty()) fault_ = late;
   } catch (const NoAnswer& error) {
     if (base::now() - asked_ > kNoAnswer) {
-      answered_ = true;
+      told_ = true;
       return error.what();
     }
     if (!fault_) return "the driver's process has not answered yet";

@@ -51,7 +51,7 @@ class IsolatedDevice final : public Device {
   /// Waits 5 ms at most for the driver's process, and tells what that said last where it takes longer.
   std::string faultText() const override;
   /// A new process does not know why the device was lost, so this one may tell first, if it does within 5 s.
-  bool lost() const noexcept override { return silent_ || (lostThere_ && answered_); }
+  bool lost() const noexcept override { return silent_ || (lostThere_ && told_); }
   void calibrate(const std::function<bool()>& stopped) override;
   using Device::calibrate;
   void interrupt() noexcept override { interrupted_ = true; }
@@ -86,8 +86,9 @@ class IsolatedDevice final : public Device {
   int socket_ = -1;
   mutable std::mutex socketMutex_;
   mutable int unanswered_ = 0;
-  mutable Nanos asked_ = 0;                   // the last request
-  mutable bool faultAsked_ = false;           // by that request
+  mutable Nanos asked_ = 0;          // the last request
+  mutable bool faultAsked_ = false;  // by that request
+  mutable bool askedWhileLost_ = false;
   mutable std::string late_;                  // text of a fault that the answer to a later request follows
   mutable std::optional<std::string> fault_;  // the last answer
 
@@ -97,7 +98,7 @@ class IsolatedDevice final : public Device {
   std::atomic<bool> interrupted_{false};
   std::atomic<bool> silent_{false};
   std::atomic<bool> lostThere_{false};
-  mutable std::atomic<bool> answered_{false};  // the process has told of its fault, or has had time to
+  mutable std::atomic<bool> told_{false};  // the process has said why, or has had time to
 
   std::atomic<std::uint64_t> commands_{0};  // counted by the loop's thread
 

@@ -15,8 +15,6 @@ namespace {
 using base::Nanos;
 
 constexpr Nanos kReopenAfter = 500'000'000;  // devices recover from shorter losses themselves
-// A driver in another process may not have told yet why its device is lost, and a new process does not know.
-constexpr Nanos kReopenUnexplainedAfter = 6'000'000'000;
 constexpr Nanos kRetryInterval = 2'000'000'000;
 constexpr Nanos kHang = 1'000'000'000;  // a loop without a tick for so long is reported
 
@@ -114,7 +112,7 @@ std::string DeviceKeeper::poll(Nanos now) {
     lostSince_ = 0;
   } else if (lostSince_ == 0) {
     lostSince_ = now;
-  } else if (now - lostSince_ > (fault.empty() ? kReopenUnexplainedAfter : kReopenAfter)) {
+  } else if (now - lostSince_ > kReopenAfter) {
     startAttempt("the device is being reopened", [this] { reopen(); });
     return fault;
   }

@@ -210,6 +210,20 @@ TEST_P(IsolationTest, AProcessTellsWhyItsDeviceIsLostBeforeItIs) {
   EXPECT_TRUE(device.lost());
 }
 
+TEST_P(IsolationTest, WhatAProcessSaidBeforeALossDoesNotExplainIt) {
+  IsolatedDevice device(host(GetParam()));
+  device.open();
+  hand->fault = 4;
+  push(device, Vec3::Zero());
+  EXPECT_TRUE(eventually([&] { return device.faultText().empty(); }));
+  hand->fault = 6;
+  const int ticks = ticks_;
+  ASSERT_TRUE(eventually([&] { return ticks_ > ticks + 20; })) << "the loss is known";
+  EXPECT_FALSE(device.lost());
+  hand->fault = 7;
+  EXPECT_TRUE(eventually([&] { return device.faultText() == "words of the driver" && device.lost(); }));
+}
+
 // 5 s, and the same for all.
 class SilentFault : public IsolationTest {};
 INSTANTIATE_TEST_SUITE_P(Paced, SilentFault, testing::Values("polled"));

@@ -81,7 +81,7 @@ class ScriptedDevice final : public device::Device {
     isCalibrated = true;
   }
   std::string faultText() const override {
-    if (isLost) return isExplained ? "the cable is out" : "";
+    if (isLost) return "the cable is out";
     return isCalibrated ? "" : "not calibrated";
   }
   bool lost() const noexcept override { return isLost; }
@@ -110,7 +110,7 @@ class ScriptedDevice final : public device::Device {
   }
 
   std::atomic<int> opens{0}, closes{0}, reads{0}, callsWhileClosed{0};
-  std::atomic<bool> isOpen{false}, isLost{false}, isExplained{true}, openBlocks{false}, startFails{false};
+  std::atomic<bool> isOpen{false}, isLost{false}, openBlocks{false}, startFails{false};
   std::atomic<bool> canBeInterrupted{true}, isInterrupted{false}, closeBlocks{false};
   std::atomic<int> zeroes{0};
   std::atomic<bool> readBlocks{false}, ticksNever{false};
@@ -308,26 +308,6 @@ TEST_P(KeeperTest, AShortLossIsReportedWithoutReopening) {
   EXPECT_EQ(keeper_.poll(2200 * kMs), "the cable is out");
   EXPECT_EQ(device_.opens + device_.closes, 0);
   EXPECT_TRUE(loopRuns());
-}
-
-// Reopened, it could not tell any more.
-TEST_P(KeeperTest, ALossThatIsNotExplainedYetIsReopenedOnlyAfterAWhile) {
-  keeper_.start();
-  device_.isExplained = false;
-  device_.isLost = true;
-  EXPECT_EQ(keeper_.poll(1000 * kMs), "");
-  EXPECT_EQ(keeper_.poll(6900 * kMs), "");
-  EXPECT_EQ(device_.opens + device_.closes, 0);
-  device_.isExplained = true;
-  EXPECT_EQ(keeper_.poll(6950 * kMs), "the cable is out");
-  EXPECT_EQ(faultAt(7000 * kMs), "");
-  EXPECT_EQ(device_.opens, 1);
-  device_.isExplained = false;
-  device_.isLost = true;
-  EXPECT_EQ(keeper_.poll(10'000 * kMs), "");
-  EXPECT_EQ(keeper_.poll(16'001 * kMs), "");
-  EXPECT_EQ(faultAt(16'100 * kMs), "");
-  EXPECT_EQ(device_.opens, 2);
 }
 
 TEST_P(KeeperTest, ReopensALostDeviceWhileNoLoopRuns) {
