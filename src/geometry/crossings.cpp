@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "geometry/mesh_check.h"
+#include "geometry/space_curve.h"
 
 namespace hapticd::geometry {
 namespace {
@@ -23,26 +24,14 @@ Vec3f highest(const Corners3f& t) {
   return t[0].cwiseMax(t[1]).cwiseMax(t[2]);
 }
 
-// Spreads the lower 21 bits over every third bit of the result.
-std::uint64_t spread(std::uint64_t bits) {
-  bits &= 0x1FFFFF;
-  bits = (bits | bits << 32U) & 0x1F00000000FFFFU;
-  bits = (bits | bits << 16U) & 0x1F0000FF0000FFU;
-  bits = (bits | bits << 8U) & 0x100F00F00F00F00FU;
-  bits = (bits | bits << 4U) & 0x10C30C30C30C30C3U;
-  return (bits | bits << 2U) & 0x1249249249249249U;
-}
-
-// Position on a space-filling curve (Morton 1966): close positions are close in space.
-std::uint64_t placeOnCurve(const Vec3& point, const Box& box) {
-  std::uint64_t place = 0;
+// Of a point in a box.
+std::uint64_t placeIn(const Box& box, const Vec3& point) {
+  Vec3 inCube = Vec3::Zero();
   for (int i = 0; i < 3; ++i) {
     const double extent = box.max[i] - box.min[i];
-    const double share = extent > 0 ? (point[i] - box.min[i]) / extent : 0;
-    place |= spread(static_cast<std::uint64_t>(std::clamp(share, 0.0, 1.0) * 0x1FFFFF))
-             << static_cast<unsigned>(i);
+    if (extent > 0) inCube[i] = std::clamp((point[i] - box.min[i]) / extent, 0.0, 1.0);
   }
-  return place;
+  return placeOnCurve(inCube);
 }
 
 bool sameCorners(const Corners3f& a, const Corners3f& b) {
@@ -75,7 +64,7 @@ void CrossingSearch::sortTriangles() {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> places;
   places.reserve(triangles_.size());
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    if (usable(triangles_[i])) places.emplace_back(placeOnCurve(middle(triangles_[i]), box), i);
+    if (usable(triangles_[i])) places.emplace_back(placeIn(box, middle(triangles_[i])), i);
   }
   std::sort(places.begin(), places.end());
   order_.reserve(places.size());

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/space_curve.h"
+
 namespace hapticd::geometry {
 namespace {
 
@@ -12,16 +14,6 @@ constexpr float kRounding = 2e-6F;  // relative: more than the operations of a t
 // Of height to length: the corners are exact here, so that the normal of a needle is, too. Many needles are
 // as long as the mesh; balls around them would rule out none.
 constexpr double kThinness = 1e-6;
-
-// 21 bits of each coordinate, alternating: what is near on this curve is near in space.
-std::uint64_t spread(std::uint64_t bits) {
-  bits &= 0x1FFFFF;
-  bits = (bits | bits << 32U) & 0x1F00000000FFFF;
-  bits = (bits | bits << 16U) & 0x1F0000FF0000FF;
-  bits = (bits | bits << 8U) & 0x100F00F00F00F00F;
-  bits = (bits | bits << 4U) & 0x10C30C30C30C30C3;
-  return (bits | bits << 2U) & 0x1249249249249249;
-}
 
 struct Placed {
   std::uint64_t key;
@@ -52,10 +44,7 @@ std::vector<Placed> ordered(const CornersOf& corners, std::span<const Triangle> 
   const double size = order.empty() ? 0 : bounds.extents().maxCoeff();
   if (size == 0) return order;  // in one place
   for (Placed& placed : order) {
-    const Vec3 at = (corners.middle(triangles[placed.triangle]) - bounds.min) / size * 0x1FFFFF;
-    placed.key = spread(static_cast<std::uint64_t>(at.x())) |
-                 spread(static_cast<std::uint64_t>(at.y())) << 1U |
-                 spread(static_cast<std::uint64_t>(at.z())) << 2U;
+    placed.key = placeOnCurve((corners.middle(triangles[placed.triangle]) - bounds.min) / size);
   }
   std::sort(order.begin(), order.end(), [](const Placed& a, const Placed& b) {
     return a.key != b.key ? a.key < b.key : a.triangle < b.triangle;

@@ -17,11 +17,6 @@ inline geometry::Vec3 nearestReached(const geometry::Vec3& last, const geometry:
                      : geometry::Vec3(geometry::Vec3::Zero());
 }
 
-/// The distance that the law limits, newtons.
-inline double forceChange(const geometry::Vec3& last, const geometry::Vec3& next) noexcept {
-  return (next - nearestReached(last, next)).norm();
-}
-
 /// The force nearest to `wanted` that the law allows after `last`; `wanted` itself when it is allowed.
 inline geometry::Vec3 withinForceRate(const geometry::Vec3& last, const geometry::Vec3& wanted,
                                       double step_N) noexcept {
