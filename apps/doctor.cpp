@@ -6,6 +6,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -115,12 +116,15 @@ Finding portFree(int type, const char* protocol, std::uint16_t port) {
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   const int yes = 1;
   if (type == SOCK_STREAM) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  const bool free = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+  const int error = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 ? 0 : errno;
   close(fd);
   const std::string name = std::string(protocol) + " port " + std::to_string(port);
-  if (free) return {Verdict::good, name + " is free", ""};
-  return {Verdict::note, name + " is in use",
-          "if that is not the server you want, use another port: hapticd serve --listen 127.0.0.1:3884"};
+  if (error == 0) return {Verdict::good, name + " is free", ""};
+  if (error == EADDRINUSE)
+    return {Verdict::note, name + " is in use",
+            "if that is not the server you want, use another port: hapticd serve --listen 127.0.0.1:3884"};
+  return {Verdict::note, name + " is refused: " + std::strerror(error),
+          error == EACCES ? "use a port above 1023: hapticd serve --listen 127.0.0.1:3884" : ""};
 }
 
 Finding isolation(double seconds) {
@@ -213,7 +217,7 @@ int run(double seconds, std::uint16_t port, bool json) {
                  {"wakeup_max_us", loop.wakeup_us.max},
                  {"compute_p99_us", loop.compute_us.p99}}}});
   } else if (bad == 0) {
-    std::printf("verdict: ready to render forces (%d notes above)\n", notes);
+    std::printf("verdict: ready to render forces (%d %s above)\n", notes, notes == 1 ? "note" : "notes");
   } else {
     const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
     std::printf("verdict: fix the %s marked -> above first; the simulated hand runs without\n",

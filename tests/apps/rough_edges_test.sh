@@ -177,6 +177,12 @@ for words in "info $recording" --version "serve --help"; do
     { cat "$work/said"; echo "status $status of $words"; exit 1; }
 done
 
+# A port that needs privileges is not called taken.
+if [ "$(id -u)" = 0 ] && [ "$(cat /proc/sys/net/ipv4/ip_unprivileged_port_start)" -gt 7 ]; then
+  setpriv --reuid=65534 --regid=65534 --clear-groups "$hapticd" doctor --seconds 0.1 --port 7 >"$work/said" || true
+  grep -q 'TCP port 7 is refused: Permission denied' "$work/said" && grep -q 'use a port above 1023' "$work/said" || { cat "$work/said"; exit 1; }
+fi
+
 # What is interrupted leaves no file behind.
 printf 't_s,x_m,y_m,z_m\n0,0.2,0,0\n100000,0.3,0,0\n' >"$work/long.csv"
 "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --hand "$work/long.csv" --out "$work/half.csv" >"$work/said" 2>&1 &
