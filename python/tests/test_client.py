@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import copy
 import gc
+import math
 import os
 import pathlib
 import pickle
@@ -30,7 +31,9 @@ from hapticd import _messages as m
 from hapticd._codec import frame
 from hapticd._core import _NUMBERS
 from hapticd._peer import COOKIE, TYPE_NAMES, Peer, _description
+from hapticd._statistics import LatencyHistogram, Statistics
 from hapticd.client import LossWatch
+from hapticd.reports import Contact, ContactsReport
 
 WIRE = pathlib.Path(__file__).resolve().parents[2] / "testdata/wire"
 
@@ -1215,3 +1218,31 @@ def test_streamed_state_is_reported_back() -> None:
             until(hand, lambda: hand._pongs > pongs and (tick < 13 or hand.latest.hand.tick == 13))
         assert hand.statistics().messages_damaged == 3 and hand.latest.hand.contacts[0].id == 4
     scripted.close()
+
+
+def test_quantiles_of_latencies_are_rounded_up_by_an_eighth_at_most() -> None:
+    seconds = np.random.default_rng(5).exponential(3e-4, 3000)
+    seconds[:10] = 0.0
+    histogram = LatencyHistogram()
+    assert histogram.count == histogram.quantile_us(0.5) == 0
+    for one in seconds:
+        histogram.add(one)
+    histogram.add(-1.0)  # clocks that disagree
+    exact = np.sort(np.append(np.floor(1e6 * seconds), 0.0))
+    assert histogram.count == len(exact)
+    for q in (0.0, 0.001, 0.1, 0.5, 0.9, 0.999, 1.0):
+        true = exact[max(1, math.ceil(q * len(exact))) - 1]
+        assert true < histogram.quantile_us(q) <= max(true + 1, 1.125 * true + 1), q
+    before, after = Statistics(taken=1.0), Statistics(taken=3.0)
+    assert after.rate_per_second("force", before) == 0
+    after.reports["force"].count = 50
+    assert after.rate_per_second("force", before) == 25 and before.rate_per_second("force", before) == 0
+
+
+def test_contacts_are_a_row_each() -> None:
+    floor, wall = Contact(3, (1, 2, 3), (0, 1, 0), (0, 5, 0)), Contact(7, (4, 5, 6), (1, 0, 0), (6, 0, 0))
+    ticks = [ContactsReport(0.5, 9, 10, [floor, wall]), ContactsReport(0.6, 11, 12, []), ContactsReport(0.7, 13, 14, [wall])]
+    rows = hapticd.reports.rows_of("contacts", ticks)
+    assert rows["tick"].tolist() == [9, 9, 13] and rows["object"].tolist() == [3, 7, 7]
+    assert rows["tick_time_ns"].tolist() == [10, 10, 14] and rows["force_N"].tolist() == [[0, 5, 0], [6, 0, 0], [6, 0, 0]]
+    assert len(hapticd.reports.rows_of("contacts", ticks[1:2])) == 0

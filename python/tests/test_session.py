@@ -101,6 +101,30 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
             session.ticks_of("Omni")
 
 
+@pytest.mark.parametrize("name", FILES)
+def test_the_guard_is_told_wherever_it_changes(name: str) -> None:
+    with hapticd.Session(RECORDINGS / f"{name}.haptics") as session:
+        ticks = session.ticks
+        changes = {int(row["tick"]): tuple(row)[2:] for row in ticks.guard()}
+        told: List[Any] = []
+        for tick, *state in zip(*(ticks[c] for c in ("tick", "guard_active", "guard_latched", "guard_armed", "guard_stopped"))):
+            if not told or tuple(state) != told[-1]:
+                told.append(tuple(state))
+                assert changes.pop(int(tick)) == told[-1]
+        assert not changes and len(told) > 1
+
+
+def test_pandas_gets_a_column_for_each_axis() -> None:
+    pytest.importorskip("pandas")
+    with hapticd.Session(RECORDINGS / "gripper_v2.haptics") as session:
+        ticks = session.ticks
+        table = ticks.to_pandas(["tick", "force_N", "T_world_device"])
+        assert list(table.columns[:4]) == ["tick", "force_N_x", "force_N_y", "force_N_z"] and len(table.columns) == 16
+        assert np.array_equal(table.index, ticks["time_ns"])
+        assert np.array_equal(table["force_N_z"], ticks["force_N"][:, 2])
+        assert np.array_equal(table["T_world_device_7"], ticks["T_world_device"][:, 1, 3])
+
+
 MARKS = ["first", "trial 3 beginnt: Größe µ", "x" * 255, ""]
 
 
