@@ -297,40 +297,56 @@ bool Proxy::searchDescent(const Vec3& target, const ActiveSet& active) noexcept 
 
 // A ball that three planes hold may have to climb by about its own size to a way on which the point that it
 // stands for slides: along a face that begins at a vertex of theirs, or along an edge between two. For each
-// such way it is lifted away from all faces, or off those of the way, to either side of them.
+// such way it is lifted away from all faces, or to either side of those of the way: of one face, alone and
+// together with each of the others.
 bool Proxy::passVertex(const Vec3& target, double enough, DescentDirections& descent) noexcept {
   const double radius = query_.radius();
+  const int faces = descent.faceCount;
   bool begins = false;
-  for (int i = 0; i < descent.faceCount && !begins; ++i) {
+  for (int i = 0; i < faces && !begins; ++i) {
     const Facet& f = descent[i].face;
     begins = std::abs(f.normal.dot(position_ - f.a)) < kOnPlane * radius;
   }
   if (!begins) return false;
   // The ball touches the vertex: down the faces themselves, not along what is square to the way to it.
   const Vec3 pull = target - position_;
-  for (int i = 0; i < descent.faceCount; ++i) {
+  for (int i = 0; i < faces; ++i) {
     const Vec3& n = descent[i].face.normal;
     descent.add(pull - n * n.dot(pull), kMinDescent * pull.norm());
   }
   const Vec3 away = position_ + radius * descent.outward.normalized();
   for (int& i = search_.direction; i < descent.count && !searchSpent(); ++i) {
     const Vec3 direction = descent.directions[static_cast<std::size_t>(i)].normalized();
-    std::array<Vec3, 2> normals{};
-    int count = 0;
-    for (int k = 0; k < descent.faceCount && count < 2; ++k) {
+    const auto holdsWay = [&](int k) {
       const Facet& f = descent[k].face;
-      if (std::abs(f.normal.dot(direction)) > kInPlane) continue;
-      if (count > 0 && std::abs(f.normal.dot(normals[0])) > kSamePlane) continue;
+      if (std::abs(f.normal.dot(direction)) > kInPlane) return false;
       const Vec3 along = descent[k].foot + radius * direction;
-      if ((along - nearestPointOf(f, along)).norm() > kAlong * radius) continue;
-      normals[static_cast<std::size_t>(count++)] = f.normal;
+      return (along - nearestPointOf(f, along)).norm() <= kAlong * radius;
+    };
+    const auto descend = [&](const Vec3& start) {
+      return descendFrom(start, i, i + 1, target, enough, descent);
+    };
+    const auto lift = [&](const Vec3& up) {
+      return descend(position_ + kVertexLift * radius * up.normalized());
+    };
+    const auto liftOffBoth = [&](const Vec3& n, const Vec3& m) {
+      return lift(n + m) || lift(m - n) || lift(n - m) || lift(-n - m);
+    };
+    int first = 0;
+    while (first < faces && !holdsWay(first)) ++first;
+    if (first == faces) continue;
+    if (descend(away)) return true;
+    const Vec3 n = descent[first].face.normal;
+    const auto isBeside = [&](int k) { return std::abs(n.dot(descent[k].face.normal)) <= kSamePlane; };
+    int second = first + 1;
+    while (second < faces && !(isBeside(second) && holdsWay(second))) ++second;
+    if (second < faces) {
+      if (liftOffBoth(n, descent[second].face.normal)) return true;
+      continue;
     }
-    if (count == 0) continue;
-    if (descendFrom(away, i, i + 1, target, enough, descent)) return true;
-    for (int side = 0; side < 1 << count; ++side) {
-      const Vec3 up = ((side & 1) != 0 ? -1 : 1) * normals[0] + ((side & 2) != 0 ? -1 : 1) * normals[1];
-      const Vec3 start = position_ + kVertexLift * radius * up.normalized();
-      if (descendFrom(start, i, i + 1, target, enough, descent)) return true;
+    if (lift(n) || lift(-n)) return true;
+    for (int k = 0; k < faces && !searchSpent(); ++k) {
+      if (isBeside(k) && liftOffBoth(n, descent[k].face.normal)) return true;
     }
   }
   return false;
