@@ -1,5 +1,6 @@
 // Device programs written for VRPN's server classes, served by this library.
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <vrpn_Analog.h>
 #include <vrpn_Auxiliary_Logger.h>
@@ -32,6 +33,7 @@
 
 #include "client/client_tests.h"
 #include "client/vrpn_device.h"
+#include "net/loopback.h"
 #include "server/scripted_peer.h"
 #include "wire/cookie.h"
 
@@ -168,6 +170,23 @@ TEST_F(VrpnServer, SendsByTcpToAClientThatDescribesAnotherMachinesUdpPort) {
   client.sendBytes(description.bytes());
   ASSERT_TRUE(askForForce());
   EXPECT_FALSE(byDatagram());
+}
+
+// Each reset is answered by one error of the force device.
+TEST_F(VrpnServer, ADatagramOfAnotherMachineIsIgnored) {
+  ScriptedPeer client(address(), "Device0", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ButtonStates>() > 0; }));
+  client.send(wire::Ping{});  // by TCP, behind the names
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Pong>() > 0; }));
+  wire::FrameEncoder reset;
+  reset.addRaw({1, 2}, 1, wire::kLocalType<wire::TrackerResetOrigin>.value, {});
+  auto stranger = net::RawSocket::connectedFrom(2, client.udpPeer(), SOCK_DGRAM);
+  ASSERT_TRUE(stranger.send({reinterpret_cast<const char*>(reset.bytes().data()), reset.bytes().size()}));
+  client.sendDatagram(reset.bytes());
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ForceError>() > 0; }));
+  client.send(wire::Ping{});
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Pong>() > 1; }));
+  EXPECT_EQ(client.count<wire::ForceError>(), 1U);
 }
 
 // The table of names is one for all clients, and has room for 2000.

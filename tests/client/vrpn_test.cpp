@@ -9,6 +9,7 @@
 #include <vrpn_Connection.h>
 #include <vrpn_Dial.h>
 #include <vrpn_ForceDevice.h>
+#include <vrpn_Mutex.h>
 #include <vrpn_Poser.h>
 #include <vrpn_Text.h>
 #include <vrpn_Thread.h>
@@ -406,9 +407,21 @@ TEST(VrpnNames, ACustomEffectThatIsTooLongIsNotSent) {
   loopback->removeReference();
 }
 
+TEST_P(Vrpn, ALockOpensTheServerOfItsNameAndClosesIt) {
+  const std::string server = name().substr(name().find('@') + 1);
+  {
+    vrpn_Mutex_Remote lock(("Lock@" + server).c_str());
+    EXPECT_NE(vrpn_ConnectionManager::instance().getByName(server.c_str()), nullptr);
+    EXPECT_TRUE(runUntil(lock, [&] { return server_.openConnections() == 1; }));
+  }
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(server.c_str()), nullptr);
+}
+
 TEST_P(Vrpn, DialsOfOtherServersAreReported) {
   vrpn_Dial_Remote dial(name().c_str());
   std::vector<vrpn_DIALCB> turns;
+  EXPECT_EQ(dial.register_change_handler(nullptr, keep<vrpn_DIALCB>), 0);
+  EXPECT_EQ(dial.unregister_change_handler(nullptr, keep<vrpn_DIALCB>), 0);
   dial.register_change_handler(&turns, keep<vrpn_DIALCB>);
   ASSERT_TRUE(ready(dial));
   char buffer[12];
