@@ -345,7 +345,7 @@ class HAPTICD_EXPORT Client {
   void setUpdateRate(double rate_Hz);
   /// Makes the present position of the proxy the origin of poses.
   void resetOrigin();
-  /// Makes a button, or all (kAllButtons), momentary or a toggle.
+  /// Makes a button, or all (kAllButtons), momentary or a toggle. With all, what is a toggle keeps its state.
   void setButtonMode(int button, ButtonMode mode);
   static constexpr int kAllButtons = -99;
   /// Sends a text, which servers of this project write to their log: at most 1023 bytes

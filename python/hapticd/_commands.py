@@ -285,7 +285,7 @@ class Commands:
         self._send(m.TrackerResetOrigin())
 
     def set_button_mode(self, button: int, mode: ButtonMode) -> None:
-        """Makes a button, or all (ALL_BUTTONS), momentary or a toggle."""
+        """Makes a button, or all (ALL_BUTTONS), momentary or a toggle. With all, what is a toggle keeps its state."""
         self._send(m.ButtonAdmin(button, mode))
 
     def send_text(self, text: str, severity: Severity = Severity.NORMAL) -> None:

@@ -33,6 +33,21 @@ TEST_P(BothWays, ConnectsAndIsAnswered) {
   EXPECT_EQ(client.statistics().connections, 1U);
 }
 
+TEST_P(BothWays, AClientThatIsReplacedLeavesItsServer) {
+  ScriptedServer first;
+  ScriptedServer second;
+  Client client(name(first));
+  client = Client(name(second));
+  EXPECT_TRUE(client.connected());
+  EXPECT_EQ(client.server(), "127.0.0.1:" + std::to_string(second.port()));
+  EXPECT_TRUE(pollUntil(client, [&] { return first.openConnections() == 0; }));
+  client.startEffect(7);
+  client.flushAll();
+  const auto received = second.waitReceived(1);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_TRUE(is(received[0], wire::StartEffect{7}));
+}
+
 TEST_P(BothWays, ReconnectsWhenTheServerIsBack) {
   auto server = std::make_unique<ScriptedServer>();
   const std::uint16_t port = server->port();
@@ -118,6 +133,9 @@ TEST(Client, WrongNamesAreQuoted) {
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@tcp://host:0"); }), HasSubstr("1 to 65535"));
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@tcp://[::1]:3883"); }), HasSubstr("IPv6"));
   EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@::1"); }), HasSubstr("IPv6"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@file:x"); }), HasSubstr("reads no files"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@unix:x"); }), HasSubstr("unix:/path"));
+  EXPECT_THAT(textOf<std::invalid_argument>([] { Client("Phantom@http://x"); }), HasSubstr("expected host,"));
   EXPECT_THAT(textOf<ConnectError>([] { Client("Phantom@nowhere.invalid"); }), HasSubstr("nowhere.invalid"));
 }
 

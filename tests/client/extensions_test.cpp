@@ -172,6 +172,28 @@ TEST(Extensions, AMeshIsSentInBulkMessagesWithinABatch) {
   EXPECT_TRUE(is(received[5], wire::BatchCommit{}));
 }
 
+TEST(Extensions, AServerWithoutBatchesGetsAMeshWithoutOne) {
+  ScriptedServer server(ableBut(wire::kFeatureBatch));
+  Client client(server.tcpName());
+  const std::vector<std::array<float, 3>> vertices{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{2, 1, 0}};
+  client.uploadMesh(3, {vertices, triangles});
+  const auto received = server.waitReceived(3);
+  ASSERT_EQ(received.size(), 3U);
+  EXPECT_TRUE(is(received[0], wire::ClearTrimesh{3}));
+  EXPECT_TRUE(is(received[1], wire::MeshVertices{3, 0, {{0, 0, 0, 1, 0, 0, 0, 1, 0}}}));
+  EXPECT_TRUE(is(received[2], wire::MeshTriangles{3, 0, {{2, 1, 0}}}));
+}
+
+TEST(Extensions, ATokenHas16To128Characters) {
+  Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms});
+  for (const std::size_t size : {1U, 15U, 129U}) {
+    EXPECT_THAT(textOf<std::invalid_argument>([&] { client.presentToken(std::string(size, 't')); }),
+                HasSubstr(std::to_string(size) + " characters; a token has 16 to 128"));
+  }
+  for (const std::size_t size : {0U, 16U, 128U}) EXPECT_NO_THROW(client.presentToken(std::string(size, 't')));
+}
+
 TEST(Extensions, AMeshInsideABatchBelongsToIt) {
   ScriptedServer server(able());
   Client client(server.tcpName());

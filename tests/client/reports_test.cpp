@@ -288,6 +288,34 @@ TEST(LatencyHistogram, QuantilesAreWithinABucket) {
   histogram -= earlier;
   EXPECT_EQ(histogram.count(), 2U);
   EXPECT_EQ(histogram.countBelow_us(1), 1U);
+  histogram += earlier;
+  histogram += earlier;
+  EXPECT_EQ(histogram.count(), 2002U);
+  EXPECT_EQ(histogram.countBelow_us(8), 17U);
+}
+
+TEST(Statistics, ARateIsThatSinceTheEarlierCopy) {
+  Statistics earlier;
+  Statistics now;
+  earlier.reports[static_cast<std::size_t>(ReportKind::force)].count = 100;
+  now.reports[static_cast<std::size_t>(ReportKind::force)].count = 110;
+  EXPECT_EQ(now.ratePerSecond(ReportKind::force, earlier), 0) << "no time has passed";
+  now.taken = earlier.taken + 2500ms;
+  EXPECT_EQ(now.ratePerSecond(ReportKind::force, earlier), 4);
+  EXPECT_EQ(now.ratePerSecond(ReportKind::pose, earlier), 0);
+}
+
+TEST(Reports, HaveNames) {
+  EXPECT_EQ(nameOf(ReportKind::pose), "pose");
+  EXPECT_EQ(nameOf(ReportKind::touchedObject), "touched object");
+  EXPECT_EQ(nameOf(ReportKind::hand), "hand");
+  EXPECT_EQ(nameOf(static_cast<ReportKind>(kReportKinds - 1)), "hand");
+  const std::string_view errors[] = {"value out of range", "duty cycle", "force", "other",
+                                     "recovered",          "other"};
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(nameOf(static_cast<ForceError>(i)), errors[i]);
+  EXPECT_EQ(nameOf(Severity::normal), "normal");
+  EXPECT_EQ(nameOf(Severity::warning), "warning");
+  EXPECT_EQ(nameOf(Severity::error), "error");
 }
 
 }  // namespace

@@ -51,6 +51,11 @@ TEST(Subscription, AScopedOneEndsWithItsScope) {
   }
   sendReport(server, client, 2);
   EXPECT_EQ(calls, 1);
+  ScopedSubscription ended = client.onTouchedObject([&](const TouchedObjectReport&) { ++calls; });
+  ended.end();
+  EXPECT_FALSE(ended.active());
+  sendReport(server, client, 3);
+  EXPECT_EQ(calls, 1);
 }
 
 TEST(Subscription, AScopedOneIsMovedAndReleased) {

@@ -42,6 +42,10 @@ TEST(Trips, KeepTheirBitsAndNames) {
 TEST(Trips, ASetIsReadFromTheBitsOfTheWire) {
   const Trips trips(0x80002010U);  // bit 31 is of a newer server
   EXPECT_THAT(std::vector<Trip>(trips.begin(), trips.end()), ElementsAre(Trip::speed, Trip::stopped));
+  auto at = trips.begin();
+  EXPECT_EQ(*at++, Trip::speed);
+  EXPECT_EQ(*at++, Trip::stopped);
+  EXPECT_EQ(at, trips.end());
   EXPECT_EQ(namesOf(trips), "speed+stopped");
   EXPECT_EQ(trips.unknownBits(), 0x80000000U);
   EXPECT_EQ(trips.bits(), 0x80002010U);

@@ -1,5 +1,6 @@
 // Device programs written for VRPN's server classes, served by this library.
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <vrpn_Analog.h>
 #include <vrpn_Auxiliary_Logger.h>
@@ -7,6 +8,7 @@
 #include <vrpn_Connection.h>
 #include <vrpn_FileConnection.h>
 #include <vrpn_FileController.h>
+#include <vrpn_ForceDevice.h>
 #include <vrpn_Forwarder.h>
 #include <vrpn_ForwarderController.h>
 #include <vrpn_LamportClock.h>
@@ -31,6 +33,7 @@
 
 #include "client/client_tests.h"
 #include "client/vrpn_device.h"
+#include "net/loopback.h"
 #include "server/scripted_peer.h"
 #include "wire/cookie.h"
 
@@ -169,6 +172,23 @@ TEST_F(VrpnServer, SendsByTcpToAClientThatDescribesAnotherMachinesUdpPort) {
   EXPECT_FALSE(byDatagram());
 }
 
+// Each reset is answered by one error of the force device.
+TEST_F(VrpnServer, ADatagramOfAnotherMachineIsIgnored) {
+  ScriptedPeer client(address(), "Device0", ScriptedPeer::Mode::udp);
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ButtonStates>() > 0; }));
+  client.send(wire::Ping{});  // by TCP, behind the names
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Pong>() > 0; }));
+  wire::FrameEncoder reset;
+  reset.addRaw({1, 2}, 1, wire::kLocalType<wire::TrackerResetOrigin>.value, {});
+  auto stranger = net::RawSocket::connectedFrom(2, client.udpPeer(), SOCK_DGRAM);
+  ASSERT_TRUE(stranger.send({reinterpret_cast<const char*>(reset.bytes().data()), reset.bytes().size()}));
+  client.sendDatagram(reset.bytes());
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::ForceError>() > 0; }));
+  client.send(wire::Ping{});
+  ASSERT_TRUE(runUntil(client, [&] { return client.count<wire::Pong>() > 1; }));
+  EXPECT_EQ(client.count<wire::ForceError>(), 1U);
+}
+
 // The table of names is one for all clients, and has room for 2000.
 TEST_F(VrpnServer, AClientThatDescribesVeryManyTypesHarmsNobody) {
   ScriptedPeer greedy(address(), "Device0");
@@ -270,6 +290,24 @@ TEST_F(VrpnServer, APortThatIsTakenIsReported) {
   EXPECT_EQ(vrpn_create_server_connection(connection_->servedPort(), nullptr, nullptr, "127.0.0.1"), nullptr);
 }
 
+TEST_F(VrpnServer, APortIsServedByTheNameOfItsAddress) {
+  const std::string name = "Device0@127.0.0.1:" + std::to_string(connection_->servedPort());
+  EXPECT_EQ(vrpn_create_server_connection(name.c_str()), nullptr) << "it is taken";
+  const int port = connection_->servedPort();
+  program_.reset();
+  connection_.reset();
+  timeval before, opened, after;
+  vrpn_gettimeofday(&before);
+  connection_.reset(vrpn_create_server_connection(name.c_str()));
+  ASSERT_TRUE(connection_);
+  EXPECT_EQ(connection_->servedPort(), port);
+  EXPECT_EQ(connection_->time_since_connection_open(&opened), 0);
+  vrpn_gettimeofday(&after);
+  EXPECT_GE(vrpn_TimevalMsecs(opened), 0);
+  EXPECT_LE(vrpn_TimevalMsecs(opened), vrpn_TimevalMsecs(vrpn_TimevalDiff(after, before)));
+  EXPECT_EQ(vrpn_create_server_connection(static_cast<const char*>(nullptr)), nullptr);
+}
+
 TEST_F(VrpnServer, ProgramsMayCreateTheirConnectionThemselves) {
   vrpn_Connection_IP connection(0, nullptr, nullptr, "127.0.0.1");
   EXPECT_TRUE(connection.doing_okay());
@@ -344,6 +382,354 @@ TEST(VrpnLoopback, ServesRemotesOfTheSameProgram) {
   EXPECT_EQ(device.buttonstate[1], vrpn_BUTTON_TOGGLE_ON);
   ASSERT_EQ(channels.size(), 1U);
   EXPECT_EQ(channels[0].channel[0], 0.25);
+}
+
+// Keeps payloads as they arrive.
+struct Arrived {
+  static int VRPN_CALLBACK keep(void* list, vrpn_HANDLERPARAM p) {
+    static_cast<std::vector<std::string>*>(list)->emplace_back(p.buffer,
+                                                               static_cast<std::size_t>(p.payload_len));
+    return 0;
+  }
+};
+using Payloads = std::vector<std::string>;
+
+std::string ofNumbers(std::initializer_list<std::uint32_t> numbers) {
+  std::string bytes;
+  for (const std::uint32_t number : numbers) {
+    for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(number >> shift);
+  }
+  return bytes;
+}
+
+// As if its last client were gone, or another had come.
+void tellOf(vrpn_Connection& connection, const char* what) {
+  connection.pack_message(0, {}, connection.register_message_type(what),
+                          connection.register_sender(vrpn_CONTROL), nullptr, vrpn_CONNECTION_RELIABLE);
+}
+
+class StillTracker : public vrpn_Tracker_NULL {
+ public:
+  using vrpn_Tracker_NULL::vrpn_Tracker_NULL;
+  timeval& last() { return timestamp; }
+};
+
+TEST(VrpnLoopback, TheNullTrackerReportsEachSensorAtItsRate) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  StillTracker tracker("Still", connection.get(), 2, 1e-3);
+  vrpn_Tracker_Remote remote("Still", connection.get());
+  struct Seen {
+    std::string reports;
+    void add(char kind, vrpn_int32 sensor, const vrpn_float64* v, const vrpn_float64* q) {
+      reports += std::string{kind} + std::to_string(sensor);
+      EXPECT_EQ(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], 0);
+      EXPECT_EQ(q[0] * q[0] + q[1] * q[1] + q[2] * q[2], 0);
+      EXPECT_EQ(q[3], 1);
+    }
+  } seen;
+  remote.register_change_handler(&seen, [](void* self, const vrpn_TRACKERCB r) {
+    static_cast<Seen*>(self)->add('p', r.sensor, r.pos, r.quat);
+  });
+  remote.register_change_handler(&seen, [](void* self, const vrpn_TRACKERVELCB r) {
+    static_cast<Seen*>(self)->add('v', r.sensor, r.vel, r.vel_quat);
+    EXPECT_EQ(r.vel_quat_dt, 1);
+  });
+  remote.register_change_handler(&seen, [](void* self, const vrpn_TRACKERACCCB r) {
+    static_cast<Seen*>(self)->add('a', r.sensor, r.acc, r.acc_quat);
+    EXPECT_EQ(r.acc_quat_dt, 1);
+  });
+  const auto reported = [&] {
+    seen.reports.clear();
+    tracker.mainloop();
+    return seen.reports;
+  };
+  const std::string all = "p0v0a0p1v1a1";
+  EXPECT_EQ(reported(), all);
+  EXPECT_EQ(reported(), "");
+  tracker.last().tv_sec -= 500;
+  EXPECT_EQ(reported(), "");
+  tracker.last().tv_sec -= 600;
+  EXPECT_EQ(reported(), all);
+  tracker.last().tv_sec += 100000;
+  EXPECT_EQ(reported(), all) << "the clock was set back";
+}
+
+TEST(VrpnLoopback, ReportsOfSensorsThatATrackerHasNotAreRefused) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Tracker_Server tracker("Tracker", connection.get(), 2);
+  const vrpn_float64 at[3] = {1, -2, 0.5}, turned[4] = {0, 0.6, 0, -0.8};
+  EXPECT_EQ(tracker.report_pose(2, {1, 0}, at, turned), -1);
+  EXPECT_EQ(tracker.report_pose(-1, {1, 0}, at, turned), -1);
+  EXPECT_EQ(tracker.report_pose(1, {1, 0}, at, turned), 0);
+  ::testing::internal::CaptureStdout();
+  tracker.print_latest_report();
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(),
+            "sensor 1 of Tracker: position 1 -2 0.5 m, quaternion 0 0.6 0 -0.8\n");
+}
+
+// As VRPN: what is a toggle already keeps its state, and only changes are alerts.
+TEST(VrpnLoopback, AllButtonsBecomeTogglesOrMomentary) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Button_Server server("Buttons", connection.get(), 3);
+  server.set_alerts(1);
+  vrpn_Button_Remote remote("Buttons", connection.get());
+  Payloads alerts;
+  connection->register_handler(connection->register_message_type("vrpn_Button Alert"), Arrived::keep,
+                               &alerts);
+  const auto states = [&] { return std::vector<vrpn_int32>(server.buttonstate, server.buttonstate + 3); };
+  const auto alerted = [&] { return std::exchange(alerts, {}); };
+  remote.set_toggle(1, vrpn_BUTTON_TOGGLE_ON);
+  EXPECT_EQ(alerted(), (Payloads{ofNumbers({1, 21})}));
+  remote.set_all_toggle(vrpn_BUTTON_TOGGLE_OFF);
+  EXPECT_EQ(states(), (std::vector<vrpn_int32>{20, 21, 20}));
+  EXPECT_EQ(alerted(), (Payloads{ofNumbers({0, 20}), ofNumbers({2, 20})}));
+  remote.set_momentary(0);
+  EXPECT_EQ(alerted(), (Payloads{ofNumbers({0, 20})}));
+  remote.set_all_momentary();
+  EXPECT_EQ(states(), (std::vector<vrpn_int32>{10, 10, 10}));
+  EXPECT_EQ(alerted(), (Payloads{ofNumbers({1, 20}), ofNumbers({2, 20})}));
+  for (const std::uint32_t event : {0U, 7U, 22U}) {  // not events of VRPN
+    const std::string payload = ofNumbers({1, event});
+    connection->pack_message(8, {}, connection->register_message_type("vrpn_Button Admin"),
+                             connection->register_sender("Buttons"), payload.data(),
+                             vrpn_CONNECTION_RELIABLE);
+  }
+  server.set_toggle(3, vrpn_BUTTON_TOGGLE_ON);
+  server.set_toggle(-1, vrpn_BUTTON_TOGGLE_ON);
+  server.set_momentary(3);
+  EXPECT_EQ(states(), (std::vector<vrpn_int32>{10, 10, 10}));
+  EXPECT_EQ(alerted(), Payloads{});
+  server.set_all_toggle(vrpn_BUTTON_TOGGLE_ON);
+  EXPECT_EQ(states(), (std::vector<vrpn_int32>{21, 21, 21}));
+}
+
+// A device without toggles.
+class Panel : public vrpn_Button, public vrpn_Analog {
+ public:
+  explicit Panel(vrpn_Connection* connection)
+      : vrpn_Button("Panel", connection), vrpn_Analog("Panel", connection) {
+    num_buttons = 3;
+    num_channel = 2;
+  }
+  void mainloop() override { vrpn_Button::report_changes(); }
+  void press(int button, unsigned char state) {
+    vrpn_Button::timestamp = {40 + button, 7};
+    buttons[button] = state;
+  }
+  void turn(double value) { channel[1] = value; }
+  void reportAll() { vrpn_Button::report_states(); }
+};
+
+TEST(VrpnLoopback, APanelReportsItsButtonsOncePerChange) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Panel panel(connection.get());
+  Payloads changes, states;
+  connection->register_handler(connection->register_message_type("vrpn_Button Change"), Arrived::keep,
+                               &changes);
+  connection->register_handler(connection->register_message_type("vrpn_Button States"), Arrived::keep,
+                               &states);
+  vrpn_Button_Remote remote("Panel", connection.get());
+  std::vector<timeval> times;
+  remote.register_change_handler(&times, [](void* list, const vrpn_BUTTONCB report) {
+    static_cast<std::vector<timeval>*>(list)->push_back(report.msg_time);
+  });
+  panel.mainloop();
+  panel.press(2, 1);
+  panel.mainloop();
+  panel.mainloop();
+  panel.press(0, 1);
+  panel.press(2, 0);
+  panel.mainloop();
+  EXPECT_EQ(changes, (Payloads{ofNumbers({2, 1}), ofNumbers({0, 1}), ofNumbers({2, 0})}));
+  ASSERT_EQ(times.size(), 3U);
+  EXPECT_EQ(times[0].tv_sec, 42);
+  EXPECT_EQ(times[0].tv_usec, 7);
+  panel.reportAll();
+  EXPECT_EQ(states, (Payloads{ofNumbers({3, 1, 0, 0})}));
+  panel.turn(-0.5);
+  ::testing::internal::CaptureStdout();
+  panel.vrpn_Button::print();
+  panel.vrpn_Analog::print();
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "buttons of Panel: 1 0 0\nchannels of Panel: 0 -0.5\n");
+}
+
+TEST(VrpnLoopback, EachPrinterPrintsTheTextsOfItsDevices) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Text_Sender stick("Stick", connection.get());
+  vrpn_Text_Sender other("Other", connection.get());
+  FILE* const file = std::tmpfile();
+  ASSERT_NE(file, nullptr);
+  ::testing::internal::CaptureStdout();
+  {
+    vrpn_Text_Receiver second("Stick", connection.get());
+    vrpn_TextPrinter printer;
+    printer.set_ostream_to_use(file);
+    printer.set_min_level_to_print(vrpn_TEXT_WARNING, 3);
+    EXPECT_EQ(printer.add_object(nullptr), -1);
+    EXPECT_EQ(printer.add_object(&stick), 0);
+    EXPECT_EQ(printer.add_object(&stick), 0);
+    EXPECT_EQ(printer.add_object(&second), 0);
+    stick.send_message("a", vrpn_TEXT_NORMAL, 9);
+    stick.send_message("b", vrpn_TEXT_WARNING, 2);
+    stick.send_message("c", vrpn_TEXT_WARNING, 3);
+    vrpn_System_TextPrinter.set_ostream_to_use(nullptr);
+    stick.send_message("d", vrpn_TEXT_ERROR, 0);
+    vrpn_System_TextPrinter.set_ostream_to_use(stdout);
+    other.send_message("e", vrpn_TEXT_ERROR, 0);
+    printer.remove_object(nullptr);
+    printer.remove_object(&second);  // both are the device Stick
+    stick.send_message("f", vrpn_TEXT_ERROR, 0);
+    printer.add_object(&second);
+  }
+  vrpn_System_TextPrinter.remove_object(&other);
+  other.send_message("g", vrpn_TEXT_ERROR, 0);
+  vrpn_System_TextPrinter.add_object(&other);
+  vrpn_System_TextPrinter.set_min_level_to_print(vrpn_TEXT_NORMAL);
+  other.send_message("h", vrpn_TEXT_NORMAL, 0);
+  vrpn_System_TextPrinter.set_min_level_to_print(vrpn_TEXT_WARNING);
+  std::fflush(stdout);
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(),
+            "VRPN: warning of Stick: b\nVRPN: warning of Stick: c\nVRPN: error of Other: e\n"
+            "VRPN: error of Stick: f\nVRPN: message of Other: h\n");
+  std::rewind(file);
+  char text[200] = {};
+  const std::size_t length = std::fread(text, 1, sizeof text, file);
+  std::fclose(file);
+  EXPECT_EQ(std::string(text, length), "VRPN: warning of Stick: c\nVRPN: error of Stick: d\n");
+}
+
+class Arm : public vrpn_ForceDevice_Remote {
+ public:
+  using vrpn_ForceDevice::decode_error;
+  using vrpn_ForceDevice::decode_force;
+  using vrpn_ForceDevice::decode_scp;
+  using vrpn_ForceDevice::encode_error;
+  using vrpn_ForceDevice::encode_force;
+  using vrpn_ForceDevice_Remote::vrpn_ForceDevice_Remote;
+};
+
+TEST(VrpnLoopback, AForceDeviceShowsWhatItWasTold) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Arm arm("Arm", connection.get());
+  EXPECT_TRUE(arm.connectionAvailable());
+  Payloads effects;
+  connection->register_handler(connection->register_message_type("vrpn_ForceDevice Plane2"), Arrived::keep,
+                               &effects);
+  arm.setSurfaceKadhesionNormal(1);
+  arm.setSurfaceKadhesionLateral(2);
+  arm.setSurfaceTextureAmplitude(3);
+  arm.setSurfaceTextureWavelength(4);
+  arm.setSurfaceBuzzAmplitude(5);
+  arm.setSurfaceBuzzFrequency(6);
+  arm.setRecoveryTime(7);
+  EXPECT_EQ(arm.getRecoveryTime(), 7);
+  arm.sendSurface();
+  EXPECT_EQ(effects,
+            (Payloads{ofNumbers({0x3f800000, 0x40000000, 0x40400000, 0x40800000, 0x40a00000, 0x40c00000})}));
+  vrpn_float32 plane[4] = {1, -2, 3, 0.5F};
+  ::testing::internal::CaptureStdout();
+  arm.set_plane(plane);
+  arm.print_plane();
+  arm.set_plane(plane, -4);
+  arm.print_plane();
+  vrpn_int32 length = 0;
+  const vrpn_float64 newtons[3] = {1, -2, 0.5};
+  const std::unique_ptr<char[]> force(Arm::encode_force(length, newtons));
+  ASSERT_EQ(length, 24);
+  const std::string bytes = ofNumbers({0x3ff00000, 0, 0xc0000000, 0, 0x3fe00000, 0});
+  EXPECT_EQ(std::string(force.get(), 24), bytes);
+  connection->pack_message(24, {1, 0}, connection->register_message_type("vrpn_ForceDevice Force"),
+                           connection->register_sender("Arm"), force.get(), vrpn_CONNECTION_RELIABLE);
+  arm.print_report();
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(),
+            "plane of Arm: 1 -2 3 0.5\nplane of Arm: 1 -2 3 -4\n"
+            "force of Arm: 1 -2 0.5 N; surface contact point: 0 0 0 m, quaternion 0 0 0 1\n");
+
+  vrpn_float64 read[3] = {}, quaternion[4] = {};
+  EXPECT_EQ(Arm::decode_force(bytes.data(), 24, read), 0);
+  EXPECT_TRUE(std::equal(read, read + 3, newtons));
+  const std::string pose = bytes + ofNumbers({0, 0, 0x3fe00000, 0, 0, 0, 0xbff00000, 0});
+  EXPECT_EQ(Arm::decode_scp(pose.data(), 56, read, quaternion), 0);
+  EXPECT_EQ(quaternion[1], 0.5);
+  EXPECT_EQ(quaternion[3], -1);
+  const std::unique_ptr<char[]> error(Arm::encode_error(length, FD_FORCE_ERROR));
+  EXPECT_EQ(std::string(error.get(), static_cast<std::size_t>(length)), ofNumbers({2}));
+  vrpn_int32 code = -1;
+  EXPECT_EQ(Arm::decode_error(error.get(), 4, &code), 0);
+  EXPECT_EQ(code, FD_FORCE_ERROR);
+  for (const vrpn_int32 wrong : {-1, 0, 3, 5}) {
+    EXPECT_EQ(Arm::decode_error(bytes.data(), wrong, &code), -1);
+    EXPECT_EQ(Arm::decode_force(bytes.data(), wrong, read), -1);
+    EXPECT_EQ(Arm::decode_scp(bytes.data(), wrong, read, quaternion), -1);
+  }
+}
+
+TEST(VrpnLoopback, NewObjectsHaveNumbersThatNoOtherHas) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Arm arm("Arm", connection.get());
+  const vrpn_int32 first = arm.getNewObjectID();
+  EXPECT_GT(first, 0) << "object 0 is the device's own";
+  EXPECT_GT(arm.getNewObjectID(), first);
+  arm.addObject(12);
+  arm.addObjectExScene(10);
+  EXPECT_EQ(arm.getNewObjectID(), 13);
+  arm.addObjectExScene(14);
+  EXPECT_EQ(arm.getNewObjectID(), 15);
+}
+
+TEST(VrpnLoopback, ACommandThatADeviceRefusesIsAnError) {
+  class Refusing : public SpokenForceDevice {
+    using SpokenForceDevice::SpokenForceDevice;
+    bool addObject(vrpn_int32, vrpn_int32) override { return false; }
+  };
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Refusing device("Arm", connection.get());
+  Arm arm("Arm", connection.get());
+  vrpn_Text_Receiver texts("Arm", connection.get());
+  std::vector<std::string> errors;
+  texts.register_message_handler(&errors, [](void* list, const vrpn_TEXTCB text) {
+    static_cast<std::vector<std::string>*>(list)->push_back(std::to_string(text.type) + text.message);
+  });
+  arm.addObject(1);
+  EXPECT_EQ(errors, std::vector<std::string>{"2vrpn_ForceDevice addObject: refused by the device"});
+}
+
+TEST(VrpnLoopback, HandlersThatAreUnregisteredAreNotCalled) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  int calls = 0;
+  const auto twice = [&](auto& remote, auto handler) {
+    EXPECT_EQ(remote.register_change_handler(&calls, handler), 0);
+    EXPECT_EQ(remote.unregister_change_handler(&calls, handler), 0);
+    EXPECT_EQ(remote.unregister_change_handler(&calls, handler), -1);
+  };
+  vrpn_Tracker_Remote tracker("Device", connection.get());
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERCB) {});
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERVELCB) {});
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERACCCB) {});
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERUNIT2SENSORCB) {});
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERTRACKER2ROOMCB) {});
+  twice(
+      tracker, +[](void*, const vrpn_TRACKERWORKSPACECB) {});
+  vrpn_Analog_Remote analog("Device", connection.get());
+  twice(
+      analog, +[](void*, const vrpn_ANALOGCB) {});
+  vrpn_Button_Remote button("Device", connection.get());
+  twice(
+      button, +[](void*, const vrpn_BUTTONCB) {});
+  vrpn_Text_Receiver text("Device", connection.get());
+  const auto count = [](void* number, const vrpn_TEXTCB) { ++*static_cast<int*>(number); };
+  vrpn_Text_Sender sender("Device", connection.get());
+  text.register_message_handler(&calls, count);
+  sender.send_message("one");
+  EXPECT_EQ(text.unregister_message_handler(&calls, count), 0);
+  sender.send_message("two");
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(text.unregister_message_handler(&calls, count), -1);
 }
 
 TEST(VrpnLoopback, ARemoteOfTheSameProgramGetsTheStatesOfButtons) {
@@ -438,13 +824,42 @@ TEST(VrpnLoopback, ALockIsGrantedToOneAtATime) {
   EXPECT_TRUE(one.isHeldRemotely());
 }
 
-struct Arrived {
-  static int VRPN_CALLBACK keep(void* list, vrpn_HANDLERPARAM p) {
-    static_cast<std::vector<std::string>*>(list)->emplace_back(p.buffer,
-                                                               static_cast<std::size_t>(p.payload_len));
-    return 0;
+// The lock's owner goes away.
+TEST(VrpnLoopback, ALockIsFreedByItsEnd) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Mutex_Server server("Lock", connection.get());
+  vrpn_Mutex_Remote two("Lock", connection.get());
+  {
+    vrpn_Mutex_Remote one("Lock", connection.get());
+    one.request();
+    EXPECT_TRUE(two.isHeldRemotely());
   }
-};
+  EXPECT_TRUE(two.isAvailable());
+  two.request();
+  ASSERT_TRUE(two.isHeldLocally());
+  int denied = 0;
+  vrpn_Mutex_Remote three("Lock", connection.get());
+  three.addRequestDeniedCallback(&denied, [](void* number) { return ++*static_cast<int*>(number); });
+  EXPECT_TRUE(three.isAvailable()) << "it has not heard of the grant";
+  three.request();
+  EXPECT_TRUE(three.isHeldRemotely());
+  EXPECT_EQ(denied, 1);
+  tellOf(*connection, vrpn_dropped_last_connection);
+  vrpn_Mutex_Remote four("Lock", connection.get());
+  four.request();
+  EXPECT_TRUE(four.isHeldLocally()) << "the server freed it";
+}
+
+TEST(VrpnLoopback, ALockIsAskedForWhenItsServerIsThere) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  vrpn_Mutex_Remote lock("Lock", connection.get());
+  lock.request();
+  const vrpn_Mutex_Server server("Lock", connection.get());
+  tellOf(*connection, vrpn_dropped_connection);
+  EXPECT_FALSE(lock.isHeldLocally());
+  tellOf(*connection, vrpn_got_connection);
+  EXPECT_TRUE(lock.isHeldLocally());
+}
 
 TEST(VrpnLoopback, ForwardsUnderOtherNamesAndTakesRepetitionsOnce) {
   const ServedConnection from(vrpn_create_server_connection("loopback:"));
@@ -476,6 +891,41 @@ TEST(VrpnLoopback, ForwardsUnderOtherNamesAndTakesRepetitionsOnce) {
   EXPECT_EQ(all.size(), 4U);
 }
 
+TEST(VrpnLoopback, RepetitionsAreSentWhenTheyAreDue) {
+  const ServedConnection connection(vrpn_create_server_connection("loopback:"));
+  Payloads all, once;
+  const vrpn_int32 type = connection->register_message_type("Sign");
+  connection->register_handler(type, Arrived::keep, &all);
+  vrpn_RedundantReceiver receiver(connection.get());
+  receiver.register_handler(type, Arrived::keep, &once);
+  vrpn_RedundantTransmission redundant(connection.get());
+  const auto send = [&](const char* text, long second, int repeats, timeval interval) {
+    return redundant.pack_message(1, {second, 0}, static_cast<vrpn_uint32>(type), 0, text,
+                                  vrpn_CONNECTION_RELIABLE, repeats, &interval);
+  };
+  EXPECT_EQ(send("a", 1, 3, {0, 0}), 0);
+  EXPECT_EQ(all, Payloads{"a"}) << "it is not enabled";
+  redundant.enable(vrpn_true);
+  send("b", 2, 2, {0, 1000});
+  send("c", 3, 1, {1000, 0});
+  redundant.mainloop();
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (all.size() < 5 && std::chrono::steady_clock::now() < end) redundant.mainloop();
+  vrpn_SleepMsecs(3);
+  redundant.mainloop();
+  std::sort(all.begin(), all.end());
+  EXPECT_EQ(all, (Payloads{"a", "b", "b", "b", "c"})) << "c is not due";
+  EXPECT_EQ(once, (Payloads{"a", "b", "c"}));
+  EXPECT_EQ(receiver.unregister_handler(type, Arrived::keep, &all), -1);
+  EXPECT_EQ(receiver.unregister_handler(type, Arrived::keep, &once), 0);
+  EXPECT_EQ(receiver.unregister_handler(type, Arrived::keep, &once), -1);
+  send("d", 4, 0, {0, 0});
+  EXPECT_EQ(once.size(), 3U);
+  vrpn_RedundantTransmission nowhere(nullptr);
+  nowhere.mainloop();
+  EXPECT_EQ(nowhere.pack_message(1, {}, 0, 0, "x", vrpn_CONNECTION_RELIABLE), -1);
+}
+
 TEST(VrpnLoopback, ARemoteSetsHowOftenMessagesAreRepeated) {
   const ServedConnection connection(vrpn_create_server_connection("loopback:"));
   vrpn_RedundantTransmission redundant(connection.get());
@@ -496,11 +946,17 @@ TEST(VrpnLoopback, ARemoteSetsHowOftenMessagesAreRepeated) {
                          &interval);
   const std::string path =
       std::filesystem::temp_directory_path() / ("vrpn_memory_" + std::to_string(getpid()));
+  receiver.writeMemory((path + "/x").c_str());  // no such directory
   receiver.writeMemory(path.c_str());
-  std::ifstream in(path);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto written = [&] {
+    std::ifstream in(path);
+    return std::string{std::istreambuf_iterator<char>(in), {}};
+  };
+  EXPECT_EQ(written(), "7.8 3\n");
+  receiver.clearMemory();
+  receiver.writeMemory(path.c_str());
+  EXPECT_EQ(written(), "");
   std::remove(path.c_str());
-  EXPECT_EQ(text, "7.8 3\n");
   EXPECT_EQ(once.size(), 1U);
 }
 
@@ -564,6 +1020,16 @@ TEST(VrpnLoopback, ANumberIsShared) {
   EXPECT_EQ(seen, (std::vector<std::pair<vrpn_int32, bool>>{{3, false}, {-4, true}}));
   EXPECT_EQ(pair.updates.at(0), std::string("\0\0\0\3\0\0\0\5\0\0\0\6", 12));
   EXPECT_EQ(pair.updates.size(), 2U);
+}
+
+TEST(VrpnLoopback, ASharedNumberIsBoundOnce) {
+  SharedPair pair(VRPN_SO_DEFAULT);
+  EXPECT_STREQ(pair.server.name(), "a");
+  const ServedConnection other(vrpn_create_server_connection("loopback:"));
+  pair.remote.bindConnection(other.get());
+  vrpn_Shared_int32& number = pair.remote;
+  EXPECT_EQ(&(number = 6), &number);
+  EXPECT_EQ(pair.server, 6) << "over the first connection";
 }
 
 TEST(VrpnLoopback, TheSerializerDecidesWhichValuesCount) {
@@ -641,6 +1107,9 @@ TEST(VrpnLoopback, ARequestToLogIsAnswered) {
   EXPECT_TRUE(remote.send_logging_request("a", "", "bc", nullptr));
   EXPECT_TRUE(remote.send_logging_status_request());
   EXPECT_EQ(reports, (std::vector<std::string>{"a,NULL,bc,NULL,", "NULL,NULL,NULL,none,"}));
+  tellOf(*connection, vrpn_dropped_last_connection);
+  ASSERT_EQ(reports.size(), 3U);
+  EXPECT_EQ(reports[2], "NULL,NULL,NULL,NULL,") << "logging ends with the last client";
 }
 
 TEST(VrpnLoopback, StampsOfSeveralHostsAreOrdered) {
@@ -710,7 +1179,7 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   file->play_to_time(3.0);
   EXPECT_EQ(changes.size(), 4U);
   EXPECT_TRUE(file->eof());
-  EXPECT_EQ(file->playone(), 1);
+  EXPECT_EQ(file->playone(), -1);
   EXPECT_EQ(file->jump_to_time(2.0), 0);
   EXPECT_EQ(file->playone(), 0);
   EXPECT_EQ(changes.back().button, 2);
@@ -719,6 +1188,38 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!file->eof() && std::chrono::steady_clock::now() < end) button.mainloop();
   EXPECT_EQ(changes.size(), 9U);
+}
+
+TEST_F(VrpnFile, IsPlayedByAController) {
+  vrpn_File_Connection file(("file:" + path_).c_str());
+  EXPECT_TRUE(file.connected());
+  EXPECT_EQ(file.get_filename(), path_);
+  Payloads changes;
+  file.register_handler(file.register_message_type("vrpn_Button Change"), Arrived::keep, &changes);
+  vrpn_File_Controller controller(&file);
+  controller.set_replay_rate(2.5F);
+  EXPECT_EQ(file.get_replay_rate(), 2.5F);
+  controller.play_to_time({1, 0});
+  EXPECT_EQ(changes, (Payloads{ofNumbers({0, 1}), ofNumbers({1, 1})}));
+  controller.reset();
+  controller.set_replay_rate(1e9F);
+  changes.clear();
+  file.limit_messages_played_back(3);
+  file.mainloop();
+  const timeval moment{0, 1};
+  file.mainloop(&moment);
+  EXPECT_EQ(changes.size(), 4U) << "one that is due at once, then three";
+  EXPECT_EQ(file.playone(), -1) << "as VRPN at the end";
+  EXPECT_EQ(file.playone_to_filetime({200, 0}), 1);
+}
+
+TEST_F(VrpnFile, MustBeALogOfVrpn) {
+  for (const std::string contents : {"", "vrpn", "a text that is not a log of VRPN at all"}) {
+    std::ofstream(path_, std::ios::binary) << contents;
+    ::testing::internal::CaptureStderr();
+    EXPECT_FALSE(vrpn_File_Connection(("file:" + path_).c_str()).doing_okay());
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "VRPN: " + path_ + " is not a log file of VRPN\n");
+  }
 }
 
 TEST_F(VrpnFile, IsClosedWhenAHandlerDeletesItsLastDevice) {

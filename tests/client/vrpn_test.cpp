@@ -1,5 +1,6 @@
 // VRPN's classes over this client, as a program written for VRPN uses them.
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <quat.h>
 #include <unistd.h>
 #include <vrpn_Analog.h>
@@ -8,8 +9,10 @@
 #include <vrpn_Connection.h>
 #include <vrpn_Dial.h>
 #include <vrpn_ForceDevice.h>
+#include <vrpn_Mutex.h>
 #include <vrpn_Poser.h>
 #include <vrpn_Text.h>
+#include <vrpn_Thread.h>
 #include <vrpn_Tracker.h>
 
 #include <algorithm>
@@ -19,6 +22,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -403,9 +407,21 @@ TEST(VrpnNames, ACustomEffectThatIsTooLongIsNotSent) {
   loopback->removeReference();
 }
 
+TEST_P(Vrpn, ALockOpensTheServerOfItsNameAndClosesIt) {
+  const std::string server = name().substr(name().find('@') + 1);
+  {
+    vrpn_Mutex_Remote lock(("Lock@" + server).c_str());
+    EXPECT_NE(vrpn_ConnectionManager::instance().getByName(server.c_str()), nullptr);
+    EXPECT_TRUE(runUntil(lock, [&] { return server_.openConnections() == 1; }));
+  }
+  EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(server.c_str()), nullptr);
+}
+
 TEST_P(Vrpn, DialsOfOtherServersAreReported) {
   vrpn_Dial_Remote dial(name().c_str());
   std::vector<vrpn_DIALCB> turns;
+  EXPECT_EQ(dial.register_change_handler(nullptr, keep<vrpn_DIALCB>), 0);
+  EXPECT_EQ(dial.unregister_change_handler(nullptr, keep<vrpn_DIALCB>), 0);
   dial.register_change_handler(&turns, keep<vrpn_DIALCB>);
   ASSERT_TRUE(ready(dial));
   char buffer[12];
@@ -621,6 +637,63 @@ TEST(VrpnNames, AreTakenApart) {
   EXPECT_EQ(text(vrpn_set_service_name("Phantom@lab7:1", "Other")), "Other@lab7:1");
 }
 
+struct Work {
+  vrpn_Semaphore go{0}, done{0};
+  pthread_t ran = 0;
+  int runs = 0;
+};
+
+TEST(VrpnThreads, AThreadRunsItsFunctionOnceForEachStart) {
+  const auto function = [](vrpn_ThreadData& data) {
+    auto* work = static_cast<Work*>(data.pvUD);
+    work->go.p();
+    work->ran = pthread_self();
+    ++work->runs;
+    work->done.v();
+  };
+  EXPECT_TRUE(vrpn_Thread::available());
+  EXPECT_GE(vrpn_Thread::number_of_processors(), 1U);
+  Work first, second;
+  vrpn_Thread thread(function, {&first});
+  EXPECT_FALSE(thread.running());
+  for (Work* work : {&first, &second}) {
+    thread.userData(work);
+    EXPECT_EQ(thread.userData(), work);
+    ASSERT_TRUE(thread.go());
+    EXPECT_TRUE(thread.running());
+    EXPECT_FALSE(thread.go()) << "it runs";
+    EXPECT_FALSE(thread.kill());
+    const vrpn_Thread::thread_t id = thread.pid();
+    work->go.v();
+    work->done.p();
+    EXPECT_TRUE(pthread_equal(id, work->ran) != 0);
+    EXPECT_EQ(work->runs, 1);
+    while (thread.running()) std::this_thread::yield();
+  }
+}
+
+TEST(VrpnThreads, AGuardHoldsOneResource) {
+  vrpn_Semaphore semaphore(2);
+  {
+    vrpn::SemaphoreGuard one(semaphore);
+    one.lock();  // holds it already
+    vrpn::SemaphoreGuard two(semaphore, vrpn::try_to_lock);
+    EXPECT_TRUE(two.locked());
+    vrpn::SemaphoreGuard three(semaphore, vrpn::try_to_lock);
+    EXPECT_FALSE(three.locked());
+    one.unlock();
+    one.unlock();
+    EXPECT_TRUE(three.try_to_lock());
+    EXPECT_TRUE(three.try_to_lock());
+    EXPECT_EQ(semaphore.condP(), 0);
+  }
+  EXPECT_EQ(semaphore.condP() + semaphore.condP() + semaphore.condP(), 2);
+  EXPECT_TRUE(semaphore.reset(3));
+  EXPECT_EQ(semaphore.numResources(), 3);
+  EXPECT_EQ(semaphore.p() + semaphore.p() + semaphore.p(), 3);
+  EXPECT_EQ(semaphore.condP(), 0);
+}
+
 TEST(VrpnNames, CookiesAreCompared) {
   char cookie[32];
   ASSERT_EQ(write_vrpn_cookie(cookie, sizeof cookie, vrpn_LOG_OUTGOING), 0);
@@ -692,6 +765,101 @@ TEST(VrpnQuat, RotatesFromTheLeft) {
   }
 }
 
+// Among quaternions of one rotation that of VRPN: in the direction of the end, and of the matrix's largest
+// part.
+TEST(VrpnQuat, SignsAreThoseOfVrpn) {
+  const q_type start = Q_ID_QUAT, end = {0, 0, -sin(0.5), -cos(0.5)};
+  q_type half;
+  q_slerp(half, start, end, 0.5);
+  EXPECT_NEAR(half[Q_Z], -sin(0.25), 1e-12);
+  EXPECT_NEAR(half[Q_W], -cos(0.25), 1e-12);
+  q_slerp(half, start, end, 1);
+  EXPECT_NEAR(half[Q_W], end[Q_W], 1e-12);
+  // 200 degrees about (0.6, 0.8, 0), by Rodrigues' formula.
+  const double c = cos(Q_DEG_TO_RAD(200)), s = sin(Q_DEG_TO_RAD(200)), x = 0.6, y = 0.8;
+  const q_matrix_type columns = {{c + x * x * (1 - c), x * y * (1 - c), y * s, 0},
+                                 {x * y * (1 - c), c + y * y * (1 - c), -x * s, 0},
+                                 {-y * s, x * s, c, 0},
+                                 {0, 0, 0, 1}};
+  const double sine = sin(Q_DEG_TO_RAD(100)), cosine = cos(Q_DEG_TO_RAD(100));
+  q_matrix_type rows;
+  qogl_matrix_type gl;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) gl[4 * j + i] = rows[j][i] = columns[i][j];
+  }
+  q_type of[3];
+  q_from_col_matrix(of[0], columns);
+  q_from_row_matrix(of[1], rows);
+  q_from_ogl_matrix(of[2], gl);
+  for (const q_type& q : of) {
+    EXPECT_NEAR(q[Q_X], x * sine, 1e-12);
+    EXPECT_NEAR(q[Q_Y], y * sine, 1e-12);
+    EXPECT_NEAR(q[Q_Z], 0, 1e-12);
+    EXPECT_NEAR(q[Q_W], cosine, 1e-12);
+  }
+  qogl_matrix_type back;
+  q_to_ogl_matrix(back, of[2]);
+  for (int i = 0; i < 16; ++i) EXPECT_NEAR(back[i], gl[i], 1e-12) << i;
+}
+
+TEST(VrpnQuat, WhatHasNoDirectionIsLeftAlone) {
+  q_vec_type zero = Q_NULL_VECTOR;
+  ::testing::internal::CaptureStderr();
+  q_vec_normalize(zero, zero);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(zero[i], 0);
+  const q_vec_type up = {0, 1, 0};
+  q_type turn;
+  q_from_two_vecs(turn, zero, up);
+  EXPECT_NE(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(turn[Q_W], 1);
+  EXPECT_EQ(q_vec_magnitude(turn), 0);
+  double x, y, z, angle;
+  const q_type whole = {0, 0, 0, -1};  // a turn by 2 pi is none
+  q_to_axis_angle(&x, &y, &z, &angle, whole);
+  EXPECT_EQ(angle, 0);
+  EXPECT_EQ(z, 1);
+  const q_type q = {0.6 * sin(1.25), 0, -0.8 * sin(1.25), cos(1.25)};
+  q_to_axis_angle(&x, &y, &z, &angle, q);
+  EXPECT_NEAR(angle, 2.5, 1e-12);
+  EXPECT_NEAR(x, 0.6, 1e-12);
+  EXPECT_EQ(y, 0);
+  EXPECT_NEAR(z, -0.8, 1e-12);
+}
+
+TEST(VrpnQuat, VectorsAndMatrices) {
+  q_vec_type a = {1, 2, 3}, b = {-1, 5, 7}, v;
+  EXPECT_DOUBLE_EQ(q_vec_distance(a, b), sqrt(29.0));
+  q_vec_subtract(a, a, b);
+  q_type q = {2, -4, 4, 8};
+  q_normalize(q, q);
+  const q_type unit = {0.2, -0.4, 0.4, 0.8};
+  for (int i = 0; i < 4; ++i) EXPECT_DOUBLE_EQ(q[i], unit[i]);
+  q_from_vec(q, a);
+  EXPECT_EQ(q[Q_W], 0);
+  q_to_vec(v, q);
+  EXPECT_EQ(v[0], 2);
+  EXPECT_EQ(v[1], -3);
+  EXPECT_EQ(v[2], -4);
+  q_matrix_type m = {{1, 2, 0, 0}, {0, 1, 3, 0}, {0, 0, 1, 4}, {5, 0, 0, 1}};
+  q_matrix_mult(m, m, m);
+  const q_matrix_type square = {{1, 4, 6, 0}, {0, 1, 6, 12}, {20, 0, 1, 8}, {10, 10, 0, 1}};
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(m[i / 4][i % 4], square[i / 4][i % 4]) << i;
+  q_euler_to_col_matrix(m, Q_PI / 2, 0, Q_PI / 2);  // x to y, y to z, z to x
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) EXPECT_NEAR(m[i][j], i == (j + 1) % 3, 1e-12) << i << j;
+  }
+  ::testing::internal::CaptureStdout();
+  q_vec_print(v);
+  q_print(unit);
+  q_print_matrix(square);
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(),
+            "(2, -3, -4)\n[(0.2, -0.4, 0.4), 0.8]\n"
+            "         1          4          6          0\n"
+            "         0          1          6         12\n"
+            "        20          0          1          8\n"
+            "        10         10          0          1\n");
+}
+
 TEST(VrpnQuat, PosesComposeAndInvert) {
   q_xyz_quat_type a = {{1, 2, 3}, Q_ID_QUAT};
   q_from_axis_angle(a.quat, 0, 1, 0, 0.7);
@@ -726,6 +894,18 @@ TEST(VrpnShared, TimevalArithmetic) {
   EXPECT_EQ(vrpn_TimevalMsecs(a), 2900);
   EXPECT_TRUE(vrpn_TimevalEqual(vrpn_MsecsTimeval(2900), a));
   EXPECT_TRUE(vrpn_TimevalEqual(vrpn_TimevalScale(b, 2), {2, 400000}));
+}
+
+TEST(VrpnShared, TimesAreNormalized) {
+  const auto is = [](const timeval& t, time_t seconds, suseconds_t us) {
+    const timeval n = vrpn_TimevalNormalize(t);
+    return n.tv_sec == seconds && n.tv_usec == us;
+  };
+  EXPECT_TRUE(is({2, 3500000}, 5, 500000));
+  EXPECT_TRUE(is({1, -300000}, 0, 700000));
+  EXPECT_TRUE(is({-1, 300000}, 0, -700000));
+  EXPECT_TRUE(is({-2, -1100000}, -3, -100000));
+  EXPECT_TRUE(vrpn_test_pack_unpack());
 }
 
 TEST(VrpnShared, TimesThatDoNotFitAreVeryLong) {

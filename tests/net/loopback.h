@@ -88,8 +88,8 @@ class RawSocket {
   }
 
   /// From another address of this machine, 127.0.0.`last`.
-  static RawSocket connectedFrom(int last, const Endpoint& peer) {
-    RawSocket socket;
+  static RawSocket connectedFrom(int last, const Endpoint& peer, int type = SOCK_STREAM) {
+    RawSocket socket(type);
     const sockaddr_in own = socketAddress({kLoopbackAddress - 1 + static_cast<std::uint32_t>(last), 0});
     if (::bind(socket.fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0)
       throw std::runtime_error(std::string("bind: ") + std::strerror(errno));

@@ -75,8 +75,14 @@ inline double q_vec_distance(const q_vec_type a, const q_vec_type b) {
   q_vec_subtract(difference, a, b);
   return q_vec_magnitude(difference);
 }
+/// A vector without length prints an error and leaves the result as it was.
 inline void q_vec_normalize(q_vec_type to, const q_vec_type from) {
-  q_vec_scale(to, 1 / q_vec_magnitude(from), from);
+  const double length = q_vec_magnitude(from);
+  if (length < Q_EPSILON) {
+    fprintf(stderr, "VRPN: q_vec_normalize() of a vector without length\n");
+    return;
+  }
+  q_vec_scale(to, 1 / length, from);
 }
 inline void q_vec_cross_product(q_vec_type to, const q_vec_type a, const q_vec_type b) {
   q_vec_set(to, a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
@@ -109,10 +115,10 @@ inline void q_normalize(q_type to, const q_type from) {
   const double length = sqrt(from[0] * from[0] + from[1] * from[1] + from[2] * from[2] + from[3] * from[3]);
   for (int i = 0; i < 4; ++i) to[i] = from[i] / length;
 }
-/// The angle is 0 to 2 pi; without rotation the axis is z.
+/// The angle is 0 to 2 pi; without rotation it is 0 about z.
 inline void q_to_axis_angle(double* x, double* y, double* z, double* angle, const q_type q) {
   const double length = q_vec_magnitude(q);
-  *angle = 2 * atan2(length, q[Q_W]);
+  *angle = length > Q_EPSILON ? 2 * atan2(length, q[Q_W]) : 0;
   *x = length > Q_EPSILON ? q[Q_X] / length : 0;
   *y = length > Q_EPSILON ? q[Q_Y] / length : 0;
   *z = length > Q_EPSILON ? q[Q_Z] / length : 1;
@@ -146,7 +152,7 @@ inline void q_exp(q_type to, const q_type from) {
   q_vec_scale(to, factor, from);
   to[Q_W] = cos(angle);
 }
-/// From `start` (t = 0) to `end` (t = 1) by the shorter way.
+/// From `start` (t = 0) to `end` (t = 1) by the shorter way: from the negative of `start` where it is closer.
 inline void q_slerp(q_type to, const q_type start, const q_type end, double t) {
   double cosine = start[0] * end[0] + start[1] * end[1] + start[2] * end[2] + start[3] * end[3];
   const double sign = cosine < 0 ? -1 : 1;
@@ -158,7 +164,7 @@ inline void q_slerp(q_type to, const q_type start, const q_type end, double t) {
     a = sin((1 - t) * angle) / sin(angle);
     b = sin(t * angle) / sin(angle);
   }
-  for (int i = 0; i < 4; ++i) to[i] = a * start[i] + sign * b * end[i];
+  for (int i = 0; i < 4; ++i) to[i] = sign * a * start[i] + b * end[i];
 }
 inline void q_xform(q_vec_type to, const q_type q, const q_vec_type v) {
   const q_type point = {v[0], v[1], v[2], 0};
@@ -175,9 +181,9 @@ inline void q_from_vec(q_type to, const q_vec_type from) {
 inline void q_to_vec(q_vec_type to, const q_type from) {
   q_vec_copy(to, from);
 }
-/// The smallest rotation from the direction of a to that of b.
+/// The smallest rotation from the direction of a to that of b; none when one has no direction.
 inline void q_from_two_vecs(q_type to, const q_vec_type a, const q_vec_type b) {
-  q_vec_type u, v, axis;
+  q_vec_type u = Q_NULL_VECTOR, v = Q_NULL_VECTOR, axis;
   q_vec_normalize(u, a);
   q_vec_normalize(v, b);
   q_vec_cross_product(axis, u, v);
@@ -232,7 +238,8 @@ inline void q_from_col_matrix(q_type to, const q_matrix_type m) {
     }
     return;
   }
-  const int i = m[0][0] > m[1][1] ? (m[0][0] > m[2][2] ? 0 : 2) : (m[1][1] > m[2][2] ? 1 : 2);
+  int i = m[1][1] > m[0][0] ? 1 : 0;
+  if (m[2][2] > m[i][i]) i = 2;
   const int j = (i + 1) % 3;
   const int k = (i + 2) % 3;
   const double s = sqrt(m[i][i] - m[j][j] - m[k][k] + 1);
@@ -242,9 +249,11 @@ inline void q_from_col_matrix(q_type to, const q_matrix_type m) {
   to[k] = (m[k][i] + m[i][k]) / (2 * s);
 }
 inline void q_from_row_matrix(q_type to, const q_matrix_type m) {
-  q_type transposed;
-  q_from_col_matrix(transposed, m);
-  q_conjugate(to, transposed);
+  q_matrix_type columns;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) columns[i][j] = m[j][i];
+  }
+  q_from_col_matrix(to, columns);
 }
 /// OpenGL's matrices are row matrices as sixteen numbers.
 inline void q_to_ogl_matrix(qogl_matrix_type to, const q_type q) {

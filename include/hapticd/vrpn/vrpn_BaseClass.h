@@ -17,17 +17,25 @@ const unsigned vrpn_MAX_TEXT_LEN = 1024;
 class vrpn_BaseClass;
 class vrpn_BaseClassUnique;
 
-/// Prints the text messages of all devices to standard output, at first only warnings and errors.
+/// Prints the text messages of its devices to standard output, at first only warnings and errors. Those of a
+/// device that several objects of a program stand for are printed once, until one of them is removed.
 class VRPN_API vrpn_TextPrinter {
  public:
+  vrpn_TextPrinter();
+  ~vrpn_TextPrinter();
+  vrpn_TextPrinter(const vrpn_TextPrinter&) = delete;
+  vrpn_TextPrinter& operator=(const vrpn_TextPrinter&) = delete;
+
   void set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level = 0);
   /// NULL prints nothing.
   void set_ostream_to_use(FILE* stream);
+  /// -1 for NULL.
   int add_object(vrpn_BaseClass* device);
   void remove_object(vrpn_BaseClass* device);
 
  private:
   friend class vrpn_BaseClassUnique;
+  void add(vrpn_BaseClassUnique* device);
   void print(const vrpn_BaseClassUnique* device, const vrpn_HANDLERPARAM& p) const;
 
   std::vector<vrpn_BaseClassUnique*> devices_;
@@ -35,6 +43,7 @@ class VRPN_API vrpn_TextPrinter {
   vrpn_TEXT_SEVERITY severity_ = vrpn_TEXT_WARNING;
   vrpn_uint32 level_ = 0;
 };
+/// Prints the texts of all devices.
 extern VRPN_API vrpn_TextPrinter& vrpn_System_TextPrinter;
 
 /// What a device has once, however many device classes it is made of: name, connection, texts and pings.
@@ -116,6 +125,9 @@ class VRPN_API vrpn_BaseClassUnique {
     vrpn_int32 sender;
   };
   void open(const char* name, vrpn_Connection* connection);
+  bool isSameDevice(const vrpn_BaseClassUnique& other) const {
+    return d_connection == other.d_connection && d_sender_id == other.d_sender_id;
+  }
   static int VRPN_CALLBACK handleText(void* self, vrpn_HANDLERPARAM p);
   static int VRPN_CALLBACK handlePing(void* self, vrpn_HANDLERPARAM p);
 

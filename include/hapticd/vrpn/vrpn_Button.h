@@ -62,6 +62,7 @@ class VRPN_API vrpn_Button_Filter : public vrpn_Button {
   virtual void set_momentary(vrpn_int32 button);
   virtual void set_toggle(vrpn_int32 button, vrpn_int32 state);
   virtual void set_all_momentary();
+  /// What is a toggle already keeps its state.
   virtual void set_all_toggle(vrpn_int32 state);
   /// Whether clients are told when a toggle or its mode changes.
   void set_alerts(vrpn_int32 on) { send_alerts = on; }

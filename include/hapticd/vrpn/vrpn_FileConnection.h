@@ -41,8 +41,9 @@ class VRPN_API vrpn_File_Connection : public vrpn_Connection {
   int play_to_time(vrpn_float64 seconds);
   int play_to_time(struct timeval time);
   int play_to_filetime(const struct timeval filetime);
-  /// Plays one message: 0, or 1 at the end or when the next one is later than `filetime`.
+  /// Plays one message: 0, or -1 at the end.
   int playone();
+  /// The same: 1 at the end or when the next one is later than `filetime`.
   int playone_to_filetime(struct timeval filetime);
   /// Continues there without playing what lies between. 1 when all messages are earlier.
   int jump_to_time(vrpn_float64 seconds);

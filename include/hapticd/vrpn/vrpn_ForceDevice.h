@@ -232,6 +232,7 @@ class VRPN_API vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   void setHapticOrigin(vrpn_float32 position[3], vrpn_float32 axis[3], vrpn_float32 angle);
   void setHapticScale(vrpn_float32 scale);
   void setSceneOrigin(vrpn_float32 position[3], vrpn_float32 axis[3], vrpn_float32 angle);
+  /// A number above those of all objects that were added here.
   vrpn_int32 getNewObjectID() { return nextObjectId_++; }
   void setObjectIsTouchable(vrpn_int32 object, vrpn_bool touchable = true);
   void setObjectTouchable(vrpn_int32 object, vrpn_bool touchable = true) {
@@ -293,6 +294,7 @@ class VRPN_API vrpn_ForceDevice_Remote : public vrpn_ForceDevice {
   void send(const Message& message);
   void sendField(bool reliably);
   void sendPlane(bool reliably);
+  void reserve(vrpn_int32 object);
   void updateConstraint();
   static int VRPN_CALLBACK handleForce(void* self, vrpn_HANDLERPARAM p);
   static int VRPN_CALLBACK handleScp(void* self, vrpn_HANDLERPARAM p);

@@ -142,6 +142,8 @@ class vrpn_Mutex_Remote : public vrpn_Mutex {
     on(d_connection->register_message_type(vrpn_dropped_connection), onLost, this, vrpn_ANY_SENDER);
     if (d_connection->connected()) requestIndex();
   }
+  /// Releases it, so that it is not held by nobody.
+  virtual ~vrpn_Mutex_Remote() { release(); }
 
   vrpn_bool isAvailable() const { return state_ == AVAILABLE; }
   vrpn_bool isHeldLocally() const { return state_ == OURS; }

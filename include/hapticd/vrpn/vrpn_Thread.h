@@ -95,7 +95,7 @@ typedef void (*vrpn_THREAD_FUNC)(vrpn_ThreadData& data);
 /// destructor waits for the end of the function.
 class vrpn_Thread {
  public:
-  typedef std::thread::id thread_t;
+  typedef std::thread::native_handle_type thread_t;
 
   vrpn_Thread(vrpn_THREAD_FUNC function, vrpn_ThreadData data) : function_(function), data_(data) {}
   ~vrpn_Thread() {
@@ -124,7 +124,7 @@ class vrpn_Thread {
     const std::lock_guard<std::mutex> lock(mutex_);
     return running_;
   }
-  thread_t pid() const { return thread_.get_id(); }
+  thread_t pid() { return thread_.native_handle(); }
   static bool available() { return true; }
   static unsigned number_of_processors() { return std::thread::hardware_concurrency(); }
   void userData(void* data) { data_.pvUD = data; }

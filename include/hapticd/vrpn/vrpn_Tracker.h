@@ -161,7 +161,7 @@ class VRPN_API vrpn_Tracker_Server : public vrpn_Tracker {
 
 class vrpn_RedundantTransmission;
 
-/// Serves the identity pose and zero velocity of each sensor at a rate.
+/// Serves the identity pose, zero velocity and zero acceleration of each sensor at a rate.
 class VRPN_API vrpn_Tracker_NULL : public vrpn_Tracker_Server {
  public:
   vrpn_Tracker_NULL(const char* name, vrpn_Connection* connection, vrpn_int32 sensors = 1,

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include "client/vrpn/messages.h"
 #include "hapticd/vrpn/vrpn_Text.h"
@@ -14,13 +15,18 @@ using hapticd::client::sendMessage;
 
 namespace {
 
-// Never destroyed: a device may be in a variable that is destroyed later.
+// Neither is ever destroyed: a device may be in a variable that is destroyed later.
 vrpn_TextPrinter& systemPrinter() {
   static auto& printer = *new vrpn_TextPrinter;
   return printer;
 }
+std::vector<vrpn_TextPrinter*>& printers() {
+  static auto& all = *new std::vector<vrpn_TextPrinter*>;
+  return all;
+}
 
-std::mutex printing;  // of the printers' fields: a device belongs to one thread, a printer to all
+// Of the list of printers and of their fields: a device belongs to one thread, a printer to all.
+std::mutex printing;
 
 constexpr int kSilenceWarning_s = 3;
 constexpr int kSilenceInterval_s = 10;
@@ -28,6 +34,16 @@ constexpr int kSilenceInterval_s = 10;
 }  // namespace
 
 vrpn_TextPrinter& vrpn_System_TextPrinter = systemPrinter();
+
+vrpn_TextPrinter::vrpn_TextPrinter() {
+  const std::lock_guard lock(printing);
+  printers().push_back(this);
+}
+
+vrpn_TextPrinter::~vrpn_TextPrinter() {
+  const std::lock_guard lock(printing);
+  std::erase(printers(), this);
+}
 
 void vrpn_TextPrinter::set_min_level_to_print(vrpn_TEXT_SEVERITY severity, vrpn_uint32 level) {
   const std::lock_guard lock(printing);
@@ -40,23 +56,27 @@ void vrpn_TextPrinter::set_ostream_to_use(FILE* stream) {
   stream_ = stream;
 }
 
-int vrpn_TextPrinter::add_object(vrpn_BaseClass* device) {
+void vrpn_TextPrinter::add(vrpn_BaseClassUnique* device) {
   const std::lock_guard lock(printing);
-  devices_.push_back(device);
+  if (std::find(devices_.begin(), devices_.end(), device) == devices_.end()) devices_.push_back(device);
+}
+
+int vrpn_TextPrinter::add_object(vrpn_BaseClass* device) {
+  if (!device) return -1;
+  add(device);
   return 0;
 }
 
 void vrpn_TextPrinter::remove_object(vrpn_BaseClass* device) {
+  if (!device) return;
   const std::lock_guard lock(printing);
-  std::erase(devices_, device);
+  std::erase_if(devices_, [&](const vrpn_BaseClassUnique* d) { return d->isSameDevice(*device); });
 }
 
-// Several devices of one name receive the same text: the first of them prints it.
+// Several objects of one device receive the same text: the first of them prints it.
 void vrpn_TextPrinter::print(const vrpn_BaseClassUnique* device, const vrpn_HANDLERPARAM& p) const {
-  const std::lock_guard lock(printing);
-  const auto first = std::find_if(devices_.begin(), devices_.end(), [&](const vrpn_BaseClassUnique* d) {
-    return d->d_connection == device->d_connection && d->d_sender_id == device->d_sender_id;
-  });
+  const auto first = std::find_if(devices_.begin(), devices_.end(),
+                                  [&](const vrpn_BaseClassUnique* d) { return d->isSameDevice(*device); });
   if (!stream_ || first == devices_.end() || *first != device) return;
   receiveMessage<wire::Text>(p, [&](const wire::Text& m) {
     const auto minimum = static_cast<vrpn_uint32>(severity_);
@@ -86,17 +106,14 @@ void vrpn_BaseClassUnique::open(const char* name, vrpn_Connection* connection) {
   d_text_message_id = d_connection->register_message_type("vrpn_Base text_message");
   d_ping_message_id = d_connection->register_message_type("vrpn_Base ping_message");
   d_pong_message_id = d_connection->register_message_type("vrpn_Base pong_message");
-  {
-    const std::lock_guard lock(printing);
-    systemPrinter().devices_.push_back(this);
-  }
+  systemPrinter().add(this);
   register_autodeleted_handler(d_text_message_id, handleText, this, d_sender_id);
 }
 
 vrpn_BaseClassUnique::~vrpn_BaseClassUnique() {
   {
     const std::lock_guard lock(printing);
-    std::erase(systemPrinter().devices_, this);
+    for (vrpn_TextPrinter* printer : printers()) std::erase(printer->devices_, this);
   }
   if (d_connection) {
     for (const Registered& r : registered_)
@@ -107,7 +124,9 @@ vrpn_BaseClassUnique::~vrpn_BaseClassUnique() {
 }
 
 int vrpn_BaseClassUnique::handleText(void* self, vrpn_HANDLERPARAM p) {
-  systemPrinter().print(static_cast<vrpn_BaseClassUnique*>(self), p);
+  const std::lock_guard lock(printing);
+  for (const vrpn_TextPrinter* printer : printers())
+    printer->print(static_cast<vrpn_BaseClassUnique*>(self), p);
   return 0;
 }
 

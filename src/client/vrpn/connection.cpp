@@ -381,6 +381,7 @@ vrpn_Connection* vrpn_create_server_connection(int port, const char* local_in_lo
 
 vrpn_Connection* vrpn_create_server_connection(const char* name, const char* local_in_logfile,
                                                const char* local_out_logfile) {
+  if (!name) return nullptr;
   const char* at = std::strrchr(name, '@');
   const char* location = at ? at + 1 : name;
   if (std::strncmp(location, "loopback:", std::strlen("loopback:")) == 0) {

@@ -190,12 +190,14 @@ vrpn_Tracker_NULL::vrpn_Tracker_NULL(const char* name, vrpn_Connection* connecti
 void vrpn_Tracker_NULL::mainloop() {
   server_mainloop();
   const timeval now = orNow({});
-  if (vrpn_TimevalDurationSeconds(now, timestamp) < 1 / update_rate) return;
+  // Unsigned, so that a clock that was set back does not end the reports.
+  if (static_cast<double>(vrpn_TimevalDuration(now, timestamp)) < 1e6 / update_rate) return;
   const vrpn_float64 zero[3] = {};
   const vrpn_float64 identity[4] = {0, 0, 0, 1};
   for (vrpn_int32 sensor = 0; sensor < num_sensors; ++sensor) {
     report_pose(sensor, now, zero, identity);
     report_pose_velocity(sensor, now, zero, identity, 1);
+    report_pose_acceleration(sensor, now, zero, identity, 1);
   }
 }
 
@@ -270,7 +272,7 @@ int vrpn_Button_Filter::handleAdmin(void* self, vrpn_HANDLERPARAM p) {
     const bool all = m.button == vrpn_ALL_ID;
     if (m.event == vrpn_BUTTON_MOMENTARY) {
       all ? filter->set_all_momentary() : filter->set_momentary(m.button);
-    } else {
+    } else if (m.event == vrpn_BUTTON_TOGGLE_OFF || m.event == vrpn_BUTTON_TOGGLE_ON) {
       all ? filter->set_all_toggle(m.event) : filter->set_toggle(m.button, m.event);
     }
   });
@@ -302,10 +304,14 @@ void vrpn_Button_Filter::set_toggle(vrpn_int32 button, vrpn_int32 state) {
 }
 
 void vrpn_Button_Filter::set_all_momentary() {
-  for (vrpn_int32 i = 0; i < num_buttons; ++i) set_momentary(i);
+  for (vrpn_int32 i = 0; i < num_buttons; ++i) {
+    if (buttonstate[i] != vrpn_BUTTON_MOMENTARY) set_momentary(i);
+  }
 }
 void vrpn_Button_Filter::set_all_toggle(vrpn_int32 state) {
-  for (vrpn_int32 i = 0; i < num_buttons; ++i) set_toggle(i, state);
+  for (vrpn_int32 i = 0; i < num_buttons; ++i) {
+    if (buttonstate[i] == vrpn_BUTTON_MOMENTARY) set_toggle(i, state);
+  }
 }
 
 void vrpn_Button_Filter::report_changes() {

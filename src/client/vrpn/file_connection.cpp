@@ -106,7 +106,7 @@ void vrpn_File_Connection::play(const Entry& entry) {
 }
 
 int vrpn_File_Connection::playone() {
-  if (eof() != 0) return 1;
+  if (eof() != 0) return -1;
   const Entry& entry = entries_[next_++];
   if (vrpn_TimevalGreater(entry.time, position_)) position_ = entry.time;
   play(entry);

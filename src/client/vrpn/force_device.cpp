@@ -1,6 +1,7 @@
 #include "hapticd/vrpn/vrpn_ForceDevice.h"
 
 #include <cmath>
+#include <limits>
 
 #include "client/vrpn/messages.h"
 
@@ -185,10 +186,15 @@ void vrpn_ForceDevice_Remote::stopSurface() {
   sendPlane(true);
 }
 
+void vrpn_ForceDevice_Remote::reserve(vrpn_int32 object) {
+  if (object >= nextObjectId_ && object < std::numeric_limits<vrpn_int32>::max()) nextObjectId_ = object + 1;
+}
 void vrpn_ForceDevice_Remote::addObject(vrpn_int32 object, vrpn_int32 parent) {
+  reserve(object);
   send(wire::AddObject{object, parent});
 }
 void vrpn_ForceDevice_Remote::addObjectExScene(vrpn_int32 object) {
+  reserve(object);
   send(wire::AddObjectExScene{object});
 }
 void vrpn_ForceDevice_Remote::setObjectVertex(vrpn_int32 object, vrpn_int32 vertex, vrpn_float32 x,

@@ -21,6 +21,7 @@ bool ButtonModes::setMode(const wire::ButtonAdmin& admin, std::string& error) {
   }
   for (std::int32_t i = all ? 0 : admin.button; i < (all ? count_ : admin.button + 1); ++i) {
     const std::uint32_t bit = 1U << i;
+    if (all && !momentary && (toggles_ & bit) != 0) continue;
     const std::uint32_t toggles = momentary ? toggles_ & ~bit : toggles_ | bit;
     const std::uint32_t nowOn = on ? on_ | bit : on_ & ~bit;
     changed_ |= (toggles_ ^ toggles) | (on_ ^ nowOn);

@@ -14,7 +14,8 @@ class ButtonModes {
   /// `count`: number of buttons, at most 32; further ones are always momentary.
   explicit ButtonModes(int count) : count_(count) {}
 
-  /// Applies an Admin message. Returns false for an unknown button or mode; `error` is then the reason.
+  /// Applies an Admin message; one that makes all buttons toggles keeps the state of those that are. Returns
+  /// false for an unknown button or mode; `error` is then the reason.
   bool setMode(const wire::ButtonAdmin& admin, std::string& error);
 
   /// Converts the device's button bits to the reported ones: a toggle changes when its button is pressed.

@@ -61,6 +61,23 @@ TEST(ButtonModes, SetsAllButtonsAndTogglesThatAreInitiallyOn) {
   EXPECT_EQ(modes.apply(0, alerts), 1U);
 }
 
+// As in VRPN.
+TEST(ButtonModes, WhatIsAToggleKeepsItsStateWhenAllBecomeToggles) {
+  ButtonModes modes(3);
+  std::vector<wire::ButtonAlert> alerts;
+  std::string error;
+  ASSERT_TRUE(modes.setMode({1, wire::kButtonToggleOn}, error));
+  EXPECT_EQ(modes.apply(0, alerts), 2U);
+  alerts.clear();
+  ASSERT_TRUE(modes.setMode({wire::kAllButtons, wire::kButtonToggleOff}, error));
+  EXPECT_EQ(modes.apply(0, alerts), 2U);
+  ASSERT_EQ(alerts.size(), 2U);
+  EXPECT_EQ(alerts[0].button, 0);
+  EXPECT_EQ(alerts[1].button, 2);
+  EXPECT_EQ(modes.apply(1, alerts), 3U) << "the others are toggles now";
+  EXPECT_EQ(modes.apply(0, alerts), 3U);
+}
+
 // However many Admin messages come between two ticks, and with as many buttons as there can be.
 TEST(ButtonModes, OneTickTellsTheLastStateOfEachButtonThatChanged) {
   ButtonModes modes(32);
