@@ -8,6 +8,7 @@
 #include <functional>
 #include <list>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "device/haply/service_connection.h"
 #include "feeling.h"
@@ -297,6 +298,42 @@ TEST(HaplyPort, ItsClientsAreCountedAndShown) {
                }).is_null());
   HaplyClient next(port);
   EXPECT_EQ(next.first["session_id"], 17);
+}
+
+TEST(HaplyPort, ANetworkIsRefusedUntilItIsTrusted) {
+  LogLines log;
+  server::ServerConfig config = withHaply(RunningServer::anyPort());
+  config.tls = server::kTlsGenerated;
+  config.tlsLoopback = true;  // this machine counts as a distant one
+  {
+    RunningServer server(config);
+    EXPECT_THROW(HaplyClient(*server.server().haplyAddress()), device::haply::ConnectionError);
+    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: this port is not encrypted, and 127.0.0.1 "
+                        "is not in trusted_networks"),
+              1U)
+        << log.text();
+  }
+  config.trustedNetworks = {"127.0.0.0/8"};
+  RunningServer server(config);
+  HaplyClient client(*server.server().haplyAddress());
+  EXPECT_EQ(client.first["session_id"], 1);
+}
+
+TEST(HaplyPort, ItsClientsCountAmongAllConnections) {
+  LogLines log;
+  server::ServerConfig config = withHaply(RunningServer::anyPort());
+  config.limits.connections = 1;
+  RunningServer server(config);
+  const net::Endpoint port = *server.server().haplyAddress();
+  {
+    HaplyClient first(port);
+    EXPECT_THROW(HaplyClient{port}, device::haply::ConnectionError);
+    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: the server is full"), 1U) << log.text();
+  }
+  const auto end = std::chrono::steady_clock::now() + kLimit;
+  while (log.count("(127.0.0.1, haply) disconnected") == 0 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(HaplyClient(port).first["session_id"], 2);
 }
 
 // As clients do whose JSON library makes bytes.
