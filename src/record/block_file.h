@@ -51,8 +51,6 @@ class BlockReader {
 
   /// The next whole block; false at the end and where nothing whole follows.
   bool next(Block& block);
-  /// The position of the next block in the file.
-  std::uint64_t offset() const noexcept { return offset_; }
   /// Why next() was false before the end of the file, naming the byte; empty when it was the end.
   const std::string& damage() const noexcept { return damage_; }
 

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,7 +41,9 @@ class LateRecording {
   static constexpr base::Nanos kTick = 1'000'000;
   static constexpr std::size_t kBatch_bytes = 8192;
 
-  LateRecording() {
+  /// The damping of the bare arm is that of RenderOptions.
+  explicit LateRecording(double bareDamping_Ns_per_m = std::numeric_limits<double>::infinity())
+      : device_(describedDevice(bareDamping_Ns_per_m)) {
     // A box from 0 to 20 mm; an object without a placement is in metres.
     send(scene::SetVertices{0, 0, boxPoints()});
     send(scene::SetTriangles{0, 0, boxTriangles(), false});
@@ -85,6 +88,8 @@ class LateRecording {
   void slowDown(base::Nanos reading) { reading_ = reading; }
   /// The same as far as the servo knows; leave() follows when the scene is less busy.
   void leaveBusyScene(scene::ClientId client) { owners_->leave(client, now_); }
+  /// What the client commands from here on exerts force again.
+  void comeBack(scene::ClientId client) { owners_->comeBack(client, owners_->leaves(client)); }
   void stream(const realtime::RemoteInput& input) { tick_.remote().write(input); }
   realtime::GuardControl& control() { return tick_.control(); }
   base::Nanos now() const { return now_; }
@@ -163,7 +168,7 @@ class LateRecording {
             {1, 6, 2}, {1, 5, 6}, {2, 7, 3}, {2, 6, 7}, {3, 4, 0}, {3, 7, 4}};
   }
 
-  static record::RecordedDevice describedDevice() {
+  static record::RecordedDevice describedDevice(double bareDamping_Ns_per_m) {
     record::RecordedDevice device;
     device.names = {"Phantom"};
     device.driver = "simulated";
@@ -171,6 +176,7 @@ class LateRecording {
     device.tick.guard.armed = true;
     device.tick.guard.peakForce_N = 4;
     device.tick.guard.continuousForce_N = 1;
+    device.tick.render.bareDamping_Ns_per_m = bareDamping_Ns_per_m;
     return device;
   }
 
@@ -198,7 +204,7 @@ class LateRecording {
     tick_(now_);
   }
 
-  const record::RecordedDevice device_ = describedDevice();
+  const record::RecordedDevice device_;
   base::Nanos now_ = 1'000'000'000;
   std::vector<base::Nanos> readings_;  // of the stopwatch, in the publication at hand
   base::Nanos reading_ = 1000;

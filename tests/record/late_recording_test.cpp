@@ -511,6 +511,45 @@ TEST(RecordingOfABusyScene, HasTheTimeAtWhichAClientLeft) {
   }
 }
 
+// Only the simulated arm goes without one.
+TEST(RecordingOfAnArm, HasItsPassivityController) {
+  const RecordingFile file;
+  LateRecording r(0.1);
+  r.glide(kAbove, 700);
+  r.record(file.path());
+  for (int i = 0; i < 10; ++i) {
+    r.glide({1, 18, 2}, 40);
+    r.glide({1, 22, 2}, 40);
+  }
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+  EXPECT_GT(compared.touching, 200U);
+  removeBlocks(file.path(), record::BlockKind::passivity);
+  EXPECT_GT(rerender(file.path()).front().largest_N, 1e-3) << "without it";
+}
+
+// As of one whose heartbeats came late.
+TEST(RecordingOfABusyScene, HasTheReturnOfAClientsForces) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide(kAbove, 700);
+  r.record(file.path());
+  pullAndPush(r, 2);
+  r.glide(kAbove, 300);
+  r.leaveBusyScene(2);
+  r.glide(kAbove, 300);
+  EXPECT_LT(r.last().force_N.norm(), 1e-3);
+  r.comeBack(2);
+  pullAndPush(r, 2);
+  r.glide(kAbove, 300);
+  EXPECT_GT(r.last().force_N.norm(), 0.1);
+  r.end();
+  const Compared compared = rerender(file.path()).front();
+  EXPECT_GT(compared.ticks, 800U);
+  EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
+}
+
 // Energy that streamed forces and contacts spent before the recording is missing in it, too.
 TEST(RecordingBegunLate, HasTheTanksOfStreamedForces) {
   const RecordingFile file;

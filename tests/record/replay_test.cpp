@@ -8,9 +8,12 @@
 #include <map>
 
 #include "record/recorded_file.h"
+#include "server/time_line.h"
 
 namespace hapticd::test {
 namespace {
+
+constexpr base::Nanos kSecond = 1'000'000'000;
 
 void startWithPhantom(record::Recorder& recorder) {
   record::RecordedDevice device;
@@ -134,7 +137,6 @@ TEST(ReplayConfig, OfOtherDevicesIsRefused) {
 }
 
 TEST(ReplaySeek, ABatchThatIsOpenDoesNotStayOpen) {
-  constexpr base::Nanos kSecond = 1'000'000'000;
   const RecordingFile file;
   {
     record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
@@ -288,11 +290,77 @@ TEST(ReplayOrder, TicksOfAllDevicesComeAtTheirTimesHoweverLateTheyWereWritten) {
   EXPECT_TRUE(std::is_sorted(played.begin(), played.end()));
 }
 
+TEST(ReplayOrder, ASpeedThatChangesDuringThePlayCountsFromThere) {
+  constexpr int kTicks = 10;
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
+    startWithPhantom(recorder);
+    for (int i = 1; i <= kTicks; ++i) {
+      realtime::TickRecord tick;
+      tick.report.time = i * kSecond;
+      recorder.ring(0).push(tick);
+    }
+    recorder.finish();
+  }
+  std::vector<base::Nanos> times;
+  std::atomic<int> played{0};
+  server::Player player({.file = file.path()});
+  player.start({.tick =
+                    [&](std::uint32_t, const realtime::TickReport& tick) {
+                      times.push_back(tick.time);
+                      ++played;
+                    },
+                .command = [](std::uint32_t, scene::ClientId, const scene::SceneCommand*) {},
+                .marker = nullptr,
+                .restart = [] {},
+                .ended = [](const std::string&) {}});
+  while (played < 1) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  player.order({.paused = false, .speed = 100, .position_s = std::nullopt});
+  while (played < kTicks) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  player.stop();
+  EXPECT_GT(times[1], times[0]);
+  for (std::size_t i = 2; i < times.size(); ++i)
+    EXPECT_NEAR(static_cast<double>(times[i] - times[i - 1]), 0.01 * kSecond, 2) << i;
+}
+
+// 500 short contacts, 80 ms and 400 ms apart in turn.
+TEST(ReplayTimeLine, HasMarkersAndJoinsTheNearestOfManyContacts) {
+  const RecordingFile file;
+  {
+    record::Recorder recorder(file.path(), [](record::RecorderProblem, const std::string&) {});
+    startWithPhantom(recorder);
+    realtime::TickRecord tick;
+    tick.report.time = kSecond;
+    for (int contact = 0; contact < 500; ++contact) {
+      tick.report.rendering.touching = true;
+      recorder.ring(0).push(tick);
+      tick.report.time += kSecond / 100;
+      tick.report.rendering.touching = false;
+      recorder.ring(0).push(tick);
+      tick.report.time += (contact % 2 == 0 ? 7 : 39) * kSecond / 100;
+    }
+    recorder.recordMarker(2 * kSecond, "trial 3");
+    recorder.finish();
+  }
+  const server::TimeLine line = server::readTimeLine(file.path(), false);
+  ASSERT_EQ(line.markers.size(), 1U);
+  EXPECT_NEAR(line.markers[0].first, 1, 1e-9);
+  EXPECT_EQ(line.markers[0].second, "trial 3");
+  ASSERT_EQ(line.contacts.size(), 250U);
+  for (std::size_t i = 0; i < line.contacts.size(); ++i) {
+    EXPECT_NEAR(line.contacts[i].first, 0.48 * static_cast<double>(i), 1e-9);
+    EXPECT_NEAR(line.contacts[i].second, 0.48 * static_cast<double>(i) + 0.08, 1e-9);
+  }
+}
+
 TEST_F(Replay, CommandsAreRefused) {
   ScriptedPeer peer(server_->address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::ResetScene{});
   EXPECT_TRUE(peer.untilText("refused: this server replays a recording"));
+  peer.send(wire::StopForces{});
+  EXPECT_TRUE(peer.untilText("Stop_Forces refused: this server replays a recording, which has no force"));
 }
 
 TEST_F(Replay, ClientsPauseAndSeek) {

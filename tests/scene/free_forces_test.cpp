@@ -202,6 +202,21 @@ TEST_F(Forces, StartMayComeBeforeItsDefinition) {
   EXPECT_TRUE(notices_.empty());
 }
 
+TEST_F(Forces, StartsThatWaitAreAsManyAsEffects) {
+  const auto most = static_cast<std::int32_t>(SceneConfig{}.limits.effects);
+  for (std::int32_t i = 0; i < most; ++i) say(StartEffect{i});
+  say(StartEffect{0});  // it waits already
+  EXPECT_TRUE(notices_.empty());
+  say(StartEffect{most}, kOther);
+  EXPECT_EQ(notices_.at(0).client, kOther);
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("startEffect " + std::to_string(most) + ": refused"));
+  say(constant(0));
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U) << "one of those that wait";
+  run(1'000 * kMillisecond);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("startEffect "));
+}
+
 // Each may have all of the bound, and all together no more.
 TEST_F(Forces, EffectsTogetherStayWithinTheBound) {
   const auto load = [this] {

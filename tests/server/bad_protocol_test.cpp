@@ -272,6 +272,8 @@ TEST_F(BadProtocol, MalformedRequestsAreRefused) {
   request("hello");
   request("127.0.0.1;reboot 4000");
   EXPECT_TRUE(untilLogged("host \"127.0.0.1;reboot\" is not letters, digits and dots")) << log_.text();
+  request("999.0.0.1 4000");
+  EXPECT_TRUE(untilLogged(" refused: ")) << log_.text();
   request(std::string(1400, 'a') + " 4000");
   EXPECT_TRUE(isIntact());
 }

@@ -400,6 +400,36 @@ TEST_F(HeldBackTest, APauseOfTheServerIsNotSilenceOfTheClient) {
       << "silent after the server resumed reading";
 }
 
+// The pause excuses it for 5 s. Then its forces end, although its scene is behind, until a heartbeat comes.
+TEST_F(HeldBackTest, AClientWithoutAHeartbeatInALongPauseFeelsNothingUntilTheNext) {
+  const auto client = peer();
+  const auto until = [&](const std::function<bool(double)>& felt) {
+    return watcher_->until([&] {
+      client->poll();
+      const auto force = watcher_->last<wire::Force>();
+      return force && felt(norm(force->force));
+    });
+  };
+  client->send(kUp);
+  ASSERT_TRUE(until([](double force_N) { return force_N > 0.95; }));
+  closeScene();
+  flood(*client, 10 * kMiB);
+  client->queue(wire::Heartbeat{1});
+  flood(*client, 30 * kMiB);
+  const std::string line =
+      "client 2: no heartbeat came through for 5 s, behind its own data or because the scene is behind; its "
+      "forces ramp out";
+  EXPECT_TRUE(until([&](double force_N) { return force_N < 0.01 && lines_.count(line) > 0; }))
+      << lines_.text();
+  EXPECT_TRUE(client->open());
+  openScene();
+  EXPECT_TRUE(until([&](double force_N) {
+    client->queue(wire::Heartbeat{1});
+    client->send(kUp);
+    return force_N > 0.95;
+  })) << lines_.text();
+}
+
 TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
   auto client = peer();
   closeScene();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "log_lines.h"
 #include "running_server.h"
 #include "scripted_peer.h"
 
@@ -74,6 +75,24 @@ TEST_F(ReportsTest, ADescriptionOfAnotherMachinesUdpPortEndsTheDatagrams) {
   description.addRaw({1, 2}, 9, wire::kUdpDescription, wire::encodeUdpDescription({"127.0.0.99", 9}));
   client->sendBytes(description.bytes());
   EXPECT_TRUE(last(false));
+}
+
+TEST_F(ReportsTest, ADescriptionThatIsNoAddressEndsTheDatagrams) {
+  const LogLines log;
+  const auto client = peer(ScriptedPeer::Mode::udp);
+  client->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 0});
+  ASSERT_TRUE(client->until([&] { return client->datagrams() > 0; }));
+  wire::FrameEncoder description;
+  description.addRaw({1, 2}, 9, wire::kUdpDescription, wire::encodeUdpDescription({"999.0.0.1", 4000}));
+  client->sendBytes(description.bytes());
+  client->forget();
+  ASSERT_TRUE(client->until([&] {
+    const auto& all = client->messages();
+    return std::any_of(all.begin(), all.end(), [](const auto& message) {
+      return message.kind == wire::kindOf<wire::TickReport> && !message.byDatagram;
+    });
+  }));
+  EXPECT_EQ(log.count("UDP address refused: "), 1U) << log.text();
 }
 
 TEST_F(ReportsTest, InvalidRatesAreRefusedByName) {

@@ -138,7 +138,7 @@ EvdevDevice::Axis EvdevDevice::readAxis(int code, double travel_m) {
   input_absinfo info{};
   const bool known = file_->control(EVIOCGABS(static_cast<unsigned>(code)), &info);
   if (!known || info.maximum <= info.minimum) {
-    throw std::runtime_error(profile_.model + ": axis " + std::to_string(code) + " has no range");
+    throw std::runtime_error(nameOf(*file_) + ": axis " + std::to_string(code) + " has no range");
   }
   Axis axis;
   axis.code = code;

@@ -39,7 +39,6 @@ class ServoThread {
   void requestStop() noexcept { stopping_.store(true, std::memory_order_release); }
   /// Valid after start().
   const ThreadSetup& setup() const noexcept { return setup_; }
-  Nanos period() const noexcept { return period_; }
 
  private:
   std::optional<Nanos> step();

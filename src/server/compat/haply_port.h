@@ -44,7 +44,6 @@ class HaplyPort {
   ~HaplyPort();
 
   const net::Endpoint& local() const noexcept { return http_.local(); }
-  std::size_t clients() const noexcept { return clients_.size(); }
   /// State and traffic of every client.
   std::vector<ClientStatus> status() const;
   /// Answers the messages that wait. Call it after each tick, and several times a second while there is none.

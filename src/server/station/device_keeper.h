@@ -42,9 +42,6 @@ class DeviceKeeper {
   /// effect while the device is being reopened or calibrated.
   void calibrate();
 
-  /// How long no tick has ended; 0 without a loop. Any thread.
-  base::Nanos silence() const noexcept { return watchdog_.silence(); }
-
   /// Whether forces were stopped after a suspension of the machine since the last call.
   bool takeResumed() noexcept { return watchdog_.takeResumed(); }
 

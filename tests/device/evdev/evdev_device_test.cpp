@@ -62,6 +62,17 @@ TEST_F(EvdevTest, TakesOnlyADeviceWithAForce) {
   }
 }
 
+TEST_F(EvdevTest, AnAxisWithoutARangeIsToldWithItsDevice) {
+  joystick.maximum = joystick.minimum;
+  const auto device = make();
+  try {
+    device->open();
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "Fake Stick: axis 0 has no range");
+  }
+}
+
 TEST_F(EvdevTest, PositionAndButtonsInTheDeviceFrame) {
   const auto device = make();
   device->open();

@@ -152,11 +152,14 @@ TEST_F(HaplyTest, TheServicesStatusHoldsTheForce) {
   device.open();
   EXPECT_TRUE(eventually([&] { return state.hold == kHoldNotCalibrated; }, Vec3(1, 0, 0)));
   EXPECT_TRUE(force().isZero());
+  EXPECT_THAT(device.faultText(), HasSubstr("not calibrated"));
   service.status(R"({"calibrated": true, "ready": false})");
   EXPECT_TRUE(eventually([&] { return state.hold == kHoldDeadMan; }, Vec3(1, 0, 0)));
   EXPECT_TRUE(force().isZero());
+  EXPECT_THAT(device.faultText(), HasSubstr("power supply"));
   service.status(R"({})");
   EXPECT_TRUE(eventually([&] { return force().norm() > 0.9; }, Vec3(1, 0, 0)));
+  EXPECT_EQ(device.faultText(), "");
 }
 
 TEST_F(HaplyTest, APlaneFeelsAsOnTheSimulatedDevice) {

@@ -464,6 +464,22 @@ TEST_F(SteppedHdTest, EncodersAreNotResetWithoutConsent) {
   EXPECT_THAT(device.faultText(), AllOf(HasSubstr("reset position"), HasSubstr("--calibrate")));
 }
 
+TEST_F(SteppedHdTest, AStoppedCalibrationTakesItsConsentBack) {
+  mock->model("Premium 1.5", 1);
+  mock->calibration(0, 0x5002);
+  start();
+  int asked = 0;
+  try {
+    device.calibrate([&] { return ++asked == 2; });
+    ADD_FAILURE();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "the calibration was stopped");
+  }
+  step(300);
+  EXPECT_EQ(mock->calibrationUpdates(0), 0);
+  EXPECT_EQ(state.hold, kHoldNotCalibrated);
+}
+
 TEST_F(HdTest, EncodersAreResetWithConsentGivenBefore) {
   mock->model("Premium 1.5", 1);
   mock->calibration(0, 0x5002);

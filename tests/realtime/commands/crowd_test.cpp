@@ -7,6 +7,7 @@
 
 #include "loop.h"
 #include "realtime/render/meshes.h"
+#include "realtime/render/object_distances.h"
 #include "reduced.h"
 
 namespace hapticd::realtime::commands {
@@ -156,6 +157,45 @@ TEST_P(Crowd, moving_sheet_in_a_crowd_takes_the_hand_along) {
   }
   EXPECT_NEAR(loop.out.force_N.y(), 0.004 * kStiffness_N_per_m, 1e-3);
   EXPECT_EQ(status, 0U);
+}
+
+// What the tool reaches on a way of many metres is found, or known to be unknown.
+TEST(Distances, hold_over_metres_of_travel) {
+  constexpr double kReach_m = 0.010;
+  constexpr std::int32_t kObjects = 200;
+  std::mt19937 random{7};
+  std::uniform_real_distribution<double> place_mm(-400, 400);
+  Loop loop;
+  std::vector<Vec3> centres_m;
+  loop.send(scene::SetObjectNumber{kObjects});
+  for (std::int32_t i = 0; i < kObjects; ++i) {
+    const Vec3 centre_mm(place_mm(random), place_mm(random), place_mm(random));
+    centres_m.push_back(1e-3 * centre_mm);
+    loop.add(i, square(centre_mm, Vec3::UnitY(), 1));
+  }
+  loop.rest(Vec3::Zero(), toNanos(1));
+  ASSERT_EQ(loop.scene().objects.size(), centres_m.size());
+  const auto distances = std::make_unique<ObjectDistances>();
+  ObjectDistances::Nearest nearest;
+  const auto contains = [&](std::uint32_t i) {
+    const auto end = nearest.candidates.begin() + nearest.count;
+    return std::any_of(nearest.candidates.begin(), end, [&](const auto& c) { return c.object == i; });
+  };
+  double travel_m = 0;
+  Vec3 last = Vec3::Zero();
+  for (std::size_t k = 0; k < centres_m.size(); ++k) {
+    const Vec3 tool = centres_m[k] + Vec3(0, 0.005, 0);
+    travel_m += (tool - std::exchange(last, tool)).norm();
+    distances->findNearest(loop.scene(), loop.now, loop.now - kMs, tool, kReach_m, nearest);
+    loop.now += kMs;
+    for (std::uint32_t i = 0; i < centres_m.size(); ++i) {
+      const double most_m = (centres_m[i] - tool).norm();
+      if (most_m <= kReach_m) {
+        ASSERT_TRUE(contains(i) || nearest.free_m <= most_m) << i << " after " << travel_m << " m";
+      }
+    }
+  }
+  EXPECT_GT(travel_m, 40);
 }
 
 // Floors of square boxes, each an object of its own: more of them are near the hand than a tick examines.

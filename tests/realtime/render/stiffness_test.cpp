@@ -392,6 +392,24 @@ TEST_F(StiffnessTest, several_soft_neighbours_do_not_add_up) {
   EXPECT_GT(largest, 0.99 * kStiff);
 }
 
+// Fifteen stiff plates in one place beside a soft one: the blend stores its energy along so short a way that
+// it would push with 1.6 times what the stiffest of them alone does.
+TEST_F(StiffnessTest, several_stiff_neighbours_do_not_add_up) {
+  constexpr double kStiffest = 1000;
+  addPlate(Vec3::Zero(), -Vec3::UnitX(), Vec3::UnitZ(), 20);
+  for (int i = 0; i < 15; ++i) addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), kStiffest - i);
+  Hand hand(scene.snapshot());
+  hand.at({-0.01, 0, 0.001});
+  double largestBeside = 0;
+  for (double x = -0.01; x < 0.002; x += 2e-5) {
+    const Rendering& r = hand.at({x, 0, -0.002});
+    EXPECT_EQ(r.status, 0U) << x;
+    EXPECT_LE(r.force_N.norm(), kStiffest * r.depth_m * (1 + 1e-9)) << x;
+    if (x < -0.001) largestBeside = std::max(largestBeside, r.force_N.norm() / r.depth_m);
+  }
+  EXPECT_GT(largestBeside, 0.99 * kStiffest) << "nothing was limited";
+}
+
 // Millimetres and other transforms of the same scene give the same force.
 TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
   std::array<Vec3, 2> force;

@@ -6,7 +6,9 @@
 
 #include <chrono>
 #include <functional>
+#include <list>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "device/haply/service_connection.h"
 #include "feeling.h"
@@ -130,6 +132,28 @@ TEST_F(Haply, TheFirstFrameIsTheInventoryAndEachMessageHasOneAnswer) {
   EXPECT_FALSE(client.probed()["inverse3"][0].contains("config"));
 }
 
+// More messages at once than wait for answers: the port stops reading, reads again, and misses none.
+TEST_F(Haply, AFloodOfMessagesIsAnsweredToItsEnd) {
+  net::RawSocket client = net::RawSocket::connected(port());
+  std::string request = net::upgradeRequest("/");
+  request.replace(request.find("Host: localhost"), 15, "Host: " + port().text());
+  constexpr std::size_t kMessages = 10 * server::HaplyPort::kMostUnanswered;
+  for (std::size_t i = 0; i < kMessages; ++i) request += net::clientFrame(net::kBinary, "{}");
+  request += net::clientFrame(net::kBinary, R"({"session":{"force_render_full_state":{}}})");
+  ASSERT_TRUE(client.send(request));
+  std::string all;
+  while (all.find("handedness") == all.rfind("handedness")) {  // the first frame's and the last one's
+    std::string part(65536, '\0');
+    const ssize_t got = ::recv(client.fd(), part.data(), part.size(), 0);
+    ASSERT_GT(got, 0);
+    all.append(part, 0, static_cast<std::size_t>(got));
+  }
+  std::size_t frames = 0;
+  for (std::size_t at = all.find("control_domain"); at != std::string::npos; ++frames)
+    at = all.find("control_domain", at + 1);
+  EXPECT_EQ(frames, kMessages + 2) << "the first frame, and one for each message";
+}
+
 // Position and orientation from two devices, buttons a to c, and a force with each frame.
 TEST_F(Haply, AClientThatNeedsArmAndGripGetsBoth) {
   HaplyClient client(port());
@@ -176,6 +200,13 @@ TEST_F(Haply, AForceExpiresWithoutMessages) {
   // A stall of the machine, too, ends the force for a moment, and gives it back.
   EXPECT_FALSE(untilFrame([&] { return client.probed(); }, isFree).is_null())
       << "a message without a force holds none";
+}
+
+TEST_F(Haply, AForceThatIsTooLargeIsRefused) {
+  HaplyClient client(port());
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(isFree(client.forced({1e31, 0, 0})));
+  EXPECT_GE(log_.count("client 1: 'Phantom': force refused: a number is not finite or too large"), 1U)
+      << log_.text();
 }
 
 TEST_F(Haply, OneClientPushesAtATime) {
@@ -230,6 +261,79 @@ TEST_F(Haply, AMessageThatIsNoneEndsTheConnection) {
                 {"commands", {{"set_cursor_force", {{"values", {{"x", 1}, {"y", 0}, {"z", 0}}}}}}}}}}});
   next.receive();
   EXPECT_EQ(log_.count("there is no device \"Other\""), 1U) << log_.text();
+}
+
+TEST_F(Haply, WhatHasNoEffectIsToldOnce) {
+  HaplyClient client(port());
+  for (int i = 0; i < 3; ++i) {
+    client.send({{"inverse3",
+                  {{{"device_id", client.id}, {"commands", {{"set_cursor_position", json::object()}}}}}}});
+    client.receive();
+  }
+  EXPECT_EQ(log_.count("client 1: \"set_cursor_position\" is not supported and has no effect"), 1U)
+      << log_.text();
+}
+
+TEST(HaplyPort, ItsClientsAreCountedAndShown) {
+  RunningServer server(withHaply(withWeb()));
+  const net::Endpoint port = *server.server().haplyAddress();
+  const net::Endpoint web = *server.server().webAddress();
+  std::list<HaplyClient> clients;
+  while (clients.size() < server::HaplyPort::kMostClients) clients.emplace_back(port);
+  clients.front().probed();
+  const json shown = stateWhen(
+      web, [](const json& state) { return state["clients"].size() == server::HaplyPort::kMostClients; });
+  ASSERT_FALSE(shown.is_null());
+  const json& first = shown["clients"][0];
+  EXPECT_EQ(first["mode"], "haply");
+  EXPECT_EQ(first["devices"], json::array({"Phantom"}));
+  EXPECT_GT(first["bytes_in"], 0);
+  EXPECT_GT(first["bytes_out"], first["bytes_in"]);
+  const Answer full = get(port, "/");
+  EXPECT_EQ(full.status, 503);
+  EXPECT_EQ(full.body, "16 clients are connected, the most\n");
+  clients.pop_front();
+  EXPECT_FALSE(stateWhen(web, [](const json& state) {
+                 return state["clients"].size() == server::HaplyPort::kMostClients - 1;
+               }).is_null());
+  HaplyClient next(port);
+  EXPECT_EQ(next.first["session_id"], 17);
+}
+
+TEST(HaplyPort, ANetworkIsRefusedUntilItIsTrusted) {
+  LogLines log;
+  server::ServerConfig config = withHaply(RunningServer::anyPort());
+  config.tls = server::kTlsGenerated;
+  config.tlsLoopback = true;  // this machine counts as a distant one
+  {
+    RunningServer server(config);
+    EXPECT_THROW(HaplyClient(*server.server().haplyAddress()), device::haply::ConnectionError);
+    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: this port is not encrypted, and 127.0.0.1 "
+                        "is not in trusted_networks"),
+              1U)
+        << log.text();
+  }
+  config.trustedNetworks = {"127.0.0.0/8"};
+  RunningServer server(config);
+  HaplyClient client(*server.server().haplyAddress());
+  EXPECT_EQ(client.first["session_id"], 1);
+}
+
+TEST(HaplyPort, ItsClientsCountAmongAllConnections) {
+  LogLines log;
+  server::ServerConfig config = withHaply(RunningServer::anyPort());
+  config.limits.connections = 1;
+  RunningServer server(config);
+  const net::Endpoint port = *server.server().haplyAddress();
+  {
+    HaplyClient first(port);
+    EXPECT_THROW(HaplyClient{port}, device::haply::ConnectionError);
+    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: the server is full"), 1U) << log.text();
+  }
+  const auto end = std::chrono::steady_clock::now() + kLimit;
+  while (log.count("(127.0.0.1, haply) disconnected") == 0 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(HaplyClient(port).first["session_id"], 2);
 }
 
 // As clients do whose JSON library makes bytes.

@@ -33,13 +33,14 @@ class ReverseConnectionsTest : public testing::Test {
   net::Loop loop_;
   net::Loop clientLoop_;
   ThrottledLog log_;
+  bool plaintext_ = true;
   std::vector<net::Connection> accepted_;
   std::vector<std::unique_ptr<net::UdpSocket>> datagrams_;
   ReverseConnections connections_{loop_,
                                   kServer,
                                   {},
                                   {},
-                                  [](std::uint32_t) { return true; },
+                                  [this](std::uint32_t) { return plaintext_; },
                                   log_,
                                   [this](net::Connection c, std::unique_ptr<net::UdpSocket> udp) {
                                     accepted_.push_back(std::move(c));
@@ -108,6 +109,36 @@ TEST_F(ReverseConnectionsTest, OneAddressLeavesRoomForOthers) {
   request(far, {0x0a000001, 6000});
   loop_.runFor(milliseconds(600));
   EXPECT_EQ(network_.sockets(0) - before, 3U) << "those that have failed make room";
+}
+
+TEST_F(ReverseConnectionsTest, NoMoreThan64ArePending) {
+  network_.options.delay = 500'000'000;
+  network_.options.otherMachines = true;
+  std::vector<std::unique_ptr<net::UdpSocket>> far;
+  for (std::uint32_t i = 0; i < 5; ++i)
+    far.push_back(std::make_unique<net::UdpSocket>(clientLoop_, net::Endpoint{0x0a000001 + i, 0}));
+  const auto before = network_.sockets(0);
+  for (const auto& socket : far) {
+    for (std::uint16_t port = 5000; port < 5016; ++port) {
+      const std::string request = wire::formatUdpRequest({socket->local().addressText(), port});
+      socket->sendTo(wire::asBytes(request), kServer);
+    }
+  }
+  loop_.runFor(milliseconds(600));
+  EXPECT_EQ(network_.sockets(0) - before, 64U);
+  EXPECT_EQ(lines_.count("connection request to 10.0.0.5:5000 ignored: 64 others are pending"), 1U)
+      << lines_.text();
+}
+
+TEST_F(ReverseConnectionsTest, WhereOnlyEncryptedOnesAreAllowedTheRemedyIsTold) {
+  plaintext_ = false;
+  ask();
+  EXPECT_TRUE(accepted_.empty());
+  EXPECT_EQ(lines_.count("datagrams cannot be encrypted; use 'hapticd tunnel' on that machine"), 1U)
+      << lines_.text();
+  plaintext_ = true;
+  ask();
+  EXPECT_EQ(accepted_.size(), 1U);
 }
 
 }  // namespace
