@@ -1,6 +1,7 @@
 #include "server/time_line.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "base/time.h"
 #include "record/recording_reader.h"
@@ -36,12 +37,14 @@ TimeLine readTimeLine(const std::filesystem::path& file, const std::atomic<bool>
   record::RecordingReader reader(file);
   TimeLine line;
   std::vector<DeviceReading> devices(reader.header().devices.size());
-  base::Nanos begin = 0;
+  std::optional<base::Nanos> origin;
+  double begin = 0;  // since the first event of the file; others may be earlier
+  double end = 0;
   const auto since = [&](base::Nanos time) {
-    // The scene and the first ticks come in no order; a few milliseconds do not matter here.
-    if (begin == 0 || time < begin) begin = time;
-    const double at = base::toSeconds(time - begin);
-    line.duration_s = std::max(line.duration_s, at);
+    if (!origin) origin = time;
+    const double at = base::toSeconds(time - *origin);
+    begin = std::min(begin, at);
+    end = std::max(end, at);
     return at;
   };
   for (record::RecordingEvent event; !stopping && reader.next(event);) {
@@ -70,6 +73,13 @@ TimeLine readTimeLine(const std::filesystem::path& file, const std::atomic<bool>
   }
   std::sort(line.contacts.begin(), line.contacts.end());
   join(line.contacts);
+  line.duration_s = end - begin;
+  for (auto& marker : line.markers) marker.first -= begin;
+  for (auto& trip : line.trips) trip.first -= begin;
+  for (auto& [from, to] : line.contacts) {
+    from -= begin;
+    to -= begin;
+  }
   return line;
 }
 

@@ -34,6 +34,7 @@ class ReportsTest : public ::testing::Test {
            static_cast<double>(ticks.size() - 1);
   }
 
+  LogLines log_;
   RunningServer server_;
 };
 
@@ -78,7 +79,6 @@ TEST_F(ReportsTest, ADescriptionOfAnotherMachinesUdpPortEndsTheDatagrams) {
 }
 
 TEST_F(ReportsTest, ADescriptionThatIsNoAddressEndsTheDatagrams) {
-  const LogLines log;
   const auto client = peer(ScriptedPeer::Mode::udp);
   client->send(wire::Subscribe{.kinds = wire::kReportTick, .rate = 0});
   ASSERT_TRUE(client->until([&] { return client->datagrams() > 0; }));
@@ -92,7 +92,7 @@ TEST_F(ReportsTest, ADescriptionThatIsNoAddressEndsTheDatagrams) {
       return message.kind == wire::kindOf<wire::TickReport> && !message.byDatagram;
     });
   }));
-  EXPECT_EQ(log.count("UDP address refused: "), 1U) << log.text();
+  EXPECT_EQ(log_.count("UDP address refused: "), 1U) << log_.text();
 }
 
 TEST_F(ReportsTest, InvalidRatesAreRefusedByName) {
