@@ -1,16 +1,14 @@
 // hapticd doctor: checks the usual causes of trouble on a machine, measures the servo loop, and prints a
 // verdict with remedies.
-#include <netinet/in.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,6 +17,8 @@
 #include "device_list.h"
 #include "isolation_check.h"
 #include "loop_check.h"
+#include "net/tcp_listener.h"
+#include "net/udp_socket.h"
 #include "print_json.h"
 #include "realtime/servo/thread_setup.h"
 
@@ -108,23 +108,16 @@ Finding preemption() {
                       : "use a kernel with PREEMPT_RT"};
 }
 
-Finding portFree(int type, const char* protocol, std::uint16_t port) {
-  const int fd = socket(AF_INET, type, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const int yes = 1;
-  if (type == SOCK_STREAM) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  const int error = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 ? 0 : errno;
-  close(fd);
-  const std::string name = std::string(protocol) + " port " + std::to_string(port);
-  if (error == 0) return {Verdict::good, name + " is free", ""};
-  if (error == EADDRINUSE)
-    return {Verdict::note, name + " is in use",
-            "if that is not the server you want, use another port: hapticd serve --listen 127.0.0.1:3884"};
-  return {Verdict::note, name + " is refused: " + std::strerror(error),
-          error == EACCES ? "use a port above 1023: hapticd serve --listen 127.0.0.1:3884" : ""};
+// `open` binds the port as the server does.
+Finding portFree(const std::string& protocol, std::uint16_t port,
+                 const std::function<void(net::Loop&, const net::Endpoint&)>& open) {
+  net::Loop loop;
+  try {
+    open(loop, {net::kLoopbackAddress, port});
+    return {Verdict::good, protocol + " port " + std::to_string(port) + " is free", ""};
+  } catch (const net::Error& error) {
+    return {Verdict::note, error.what(), ""};
+  }
 }
 
 Finding isolation(double seconds) {
@@ -174,8 +167,12 @@ int run(double seconds, std::uint16_t port, bool json) {
   add(timerResolution());
   add(preemption());
   title("network\n");
-  add(portFree(SOCK_STREAM, "TCP", port));
-  add(portFree(SOCK_DGRAM, "UDP", port));
+  add(portFree("TCP", port, [](net::Loop& loop, const net::Endpoint& local) {
+    const net::TcpListener listener(loop, local, [](net::Connection) {});
+  }));
+  add(portFree("UDP", port, [](net::Loop& loop, const net::Endpoint& local) {
+    const net::UdpSocket socket(loop, local);
+  }));
   title("devices\n");
   const std::vector<device::DriverReport> devices = device::findDevices();
   if (!json) printDevices(devices);

@@ -3,12 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <vector>
 
 #include "realtime/render/renderer.h"
 #include "truth/descent.h"
@@ -198,41 +195,6 @@ TEST(SpentCasts, what_holds_the_ball_is_found_where_they_end) {
   EXPECT_NE(rendering.status & realtime::kRenderIterationLimit, 0U);
   const double way = (trial.hips.back() - trial.hips[trial.hips.size() - 2]).norm();
   EXPECT_NEAR(rendering.contactForce_N.norm(), before, trial.objects[0].material.stiffness_N_per_m * way);
-}
-
-// Below this call, where step() will keep what it works with.
-[[gnu::noinline]] void fillStack(int byte) {
-  std::array<char, 32 * 1024> space;
-  std::memset(space.data(), byte, space.size());
-  asm volatile("" ::"r"(space.data()) : "memory");
-}
-
-std::vector<Point> forcesAfter(const Trial& trial, int byte) {
-  Stage stage(trial);
-  realtime::Renderer renderer({trial.toolRadius_m, false});
-  realtime::Rendering rendering;
-  device::DeviceState state;
-  std::vector<Point> forces;
-  for (std::size_t i = 0; i < trial.hips.size(); ++i) {
-    state.time = static_cast<int>(i) * realtime::fixture::kTick;
-    state.position_m = trial.hips[i];
-    fillStack(byte);
-    renderer.step(stage.at(static_cast<int>(i)), state, state.time, realtime::fixture::kTick, rendering);
-    forces.push_back(rendering.force_N);
-  }
-  return forces;
-}
-
-// tests/truth/uninitialised_test.sh runs this under memcheck, too.
-TEST(Renderer, forces_do_not_depend_on_what_the_memory_held) {
-  for (const std::uint64_t seed : {380U, 3354U, 3507U}) {
-    const Trial trial = randomTrial(seed, "valleys");
-    EXPECT_EQ(forcesAfter(trial, 0), forcesAfter(trial, 0xbf)) << seed;
-  }
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const Trial trial = randomTrial(seed);
-    EXPECT_EQ(forcesAfter(trial, 0), forcesAfter(trial, 0xbf)) << seed;
-  }
 }
 
 // Where the renderer joins triangles, the proxy may be behind a face by 0.1 um and the force may be turned as
