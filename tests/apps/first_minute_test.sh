@@ -42,6 +42,10 @@ grep -qa '"triangles":3674' <&3
 kill -TERM "$(pgrep -P "$demo" hapticd || echo "$demo")"
 wait "$demo"
 
+without_rights demo --listen 127.0.0.1:0 --http off --seconds 1 >"$work/demo"
+! grep -n browser "$work/demo" || exit 1
+grep -q '^  watch: ' "$work/demo"
+
 without_rights self-test --seconds 0.2
 
 "$hapticd" --version | head -1 | grep -qE '^hapticd [0-9]+\.[0-9]+\.[0-9]+ \(.+\)$'

@@ -64,6 +64,7 @@ refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >"$work/three.off"
 refused 1 "three.off': the format '.off' is not supported" "$hapticd" touch "$work/three.off"
 
+refused 1 "replayed: hapticd record Phantom@tcp://$address --server, or" "$hapticd" record "Phantom@tcp://$address" "$work/own.haptics"
 # Nothing is overwritten without --force.
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
 refused 1 "exists: choose another name, or overwrite it by --force" "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
