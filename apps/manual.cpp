@@ -88,8 +88,8 @@ std::string manPage(const CLI::App& command, const std::string& name) {
   const auto commands = commandsOf(command);
   page += commands.empty() ? "[OPTIONS]" : "COMMAND [OPTIONS]";
   for (const CLI::Option* option : optionsOf(command)) {
-    if (!option->get_lnames().empty() || !option->get_snames().empty()) continue;
-    page += option->get_required() ? " " + option->get_name() : " [" + option->get_name() + "]";
+    if (!option->get_positional()) continue;
+    page += option->get_required() ? " " + option->get_name(true) : " [" + option->get_name(true) + "]";
   }
   page += "\n.SH DESCRIPTION\n.nf\n" + roff(command.get_description()) + "\n.fi\n";
   if (!commands.empty()) {

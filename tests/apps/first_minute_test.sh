@@ -61,6 +61,7 @@ done
 for page in $(command -v man >/dev/null && echo "$work"/share/man/man1/*.1); do
   [ -z "$(man --warnings -l "$page" 2>&1 >/dev/null)" ] || { man --warnings -l "$page" 2>&1 >/dev/null | head; exit 1; }
 done
+grep -qFx '[OPTIONS] [server]' "$work/share/man/man1/hapticd-stop.1"
 # Lines of an option stay lines, a page has no empty part, and the documents are where the package has them.
 grep -qFx .br "$work/share/man/man1/hapticd-serve.1"
 ! grep -A1 -x '.SH OPTIONS' "$work/share/man/man1/hapticd-bench.1" | grep -qx '.SH SEE ALSO' || exit 1
