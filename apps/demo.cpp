@@ -54,7 +54,7 @@ std::unique_ptr<server::Server> startServer(const DemoOptions& options, server::
   return nullptr;  // not reached: the last attempt returns or throws
 }
 
-// Sends the bunny and waits for the first force on it.
+// Sends the bunny and waits for the first force on it. `page` is empty where there is none.
 void present(const std::string& address, const std::string& page, const std::atomic<bool>& ending) {
   Client client("Phantom@tcp://" + address, {.reconnect = false});
   geometry::TriangleMesh mesh = bunny();
@@ -63,13 +63,14 @@ void present(const std::string& address, const std::string& page, const std::ato
   for (const auto& v : mesh.vertices) vertices.push_back({v.x(), v.y(), v.z()});
   client.setSurface(0, {.stiffness = 0.8F, .damping = 0.1F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
   client.uploadMesh(0, {vertices, mesh.triangles});
+  std::printf("The simulated hand explores the Stanford bunny.\n");
+  if (!page.empty())
+    std::printf("  see it:    open %s in a browser, and drag the hand over the bunny\n", page.c_str());
   std::printf(
-      "The simulated hand explores the Stanford bunny.\n"
-      "  see it:    open %s in a browser, and drag the hand over the bunny\n"
       "  touch:     hapticd touch FILE --server Phantom@%s\n"
       "  watch:     hapticd watch Phantom@%s\n"
       "  stop it:   Ctrl-C\n",
-      page.c_str(), address.c_str(), address.c_str());
+      address.c_str(), address.c_str());
   std::fflush(stdout);
   const auto end = std::chrono::steady_clock::now() + 30s;
   const auto force_N = [&client] {
@@ -98,7 +99,7 @@ int run(const DemoOptions& options) {
     std::fprintf(stderr,
                  "hapticd: everybody who reaches this machine may lead the demo; its hand hurts nobody\n");
   stopper.watch(*server);
-  const std::string page = web ? "http://" + reachedFromHere(*web).text() + "/" : "(no page: --http off)";
+  const std::string page = web ? "http://" + reachedFromHere(*web).text() + "/" : "";
   std::atomic<bool> ending{false};
   std::exception_ptr failure;
   std::thread presenter([&, address = reachedFromHere(server->address()).text()] {

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -88,8 +89,8 @@ std::string manPage(const CLI::App& command, const std::string& name) {
   const auto commands = commandsOf(command);
   page += commands.empty() ? "[OPTIONS]" : "COMMAND [OPTIONS]";
   for (const CLI::Option* option : optionsOf(command)) {
-    if (!option->get_lnames().empty() || !option->get_snames().empty()) continue;
-    page += option->get_required() ? " " + option->get_name() : " [" + option->get_name() + "]";
+    if (!option->get_positional()) continue;
+    page += option->get_required() ? " " + option->get_name(true) : " [" + option->get_name(true) + "]";
   }
   page += "\n.SH DESCRIPTION\n.nf\n" + roff(command.get_description()) + "\n.fi\n";
   if (!commands.empty()) {
@@ -135,25 +136,27 @@ std::string bashCompletion(const CLI::App& app) {
          "complete -o filenames -F _hapticd hapticd\n";
 }
 
-// In single quotes, with what zsh and fish would interpret removed.
-std::string plain(const std::string& text) {
+// The first line, for single quotes, without those of `special`.
+std::string plain(const std::string& text, std::string_view special) {
   std::string out;
   for (const char c : linesOf(text).empty() ? std::string() : linesOf(text).front()) {
-    if (c != '\'' && c != '[' && c != ']' && c != ':') out += c;
+    if (special.find(c) == std::string_view::npos) out += c;
   }
   return out;
 }
+constexpr std::string_view kOfZsh = "'[]:";
+constexpr std::string_view kOfFish = "'\\";
 
 std::string zshCompletion(const CLI::App& app) {
   std::string text = "#compdef hapticd\nlocal -a commands\ncommands=(\n";
   for (const CLI::App* command : commandsOf(app))
-    text += "  '" + command->get_name() + ":" + plain(command->get_description()) + "'\n";
+    text += "  '" + command->get_name() + ":" + plain(command->get_description(), kOfZsh) + "'\n";
   text += ")\nif (( CURRENT == 2 )); then\n  _describe command commands\n  return\nfi\ncase $words[2] in\n";
   for (const CLI::App* command : commandsOf(app)) {
     text += "  " + command->get_name() + ") _arguments";
     for (const CLI::Option* option : optionsOf(*command)) {
       for (const std::string& name : option->get_lnames())
-        text += " \\\n    '--" + name + "[" + plain(option->get_description()) + "]" +
+        text += " \\\n    '--" + name + "[" + plain(option->get_description(), kOfZsh) + "]" +
                 (takesValue(*option) ? ":value:_files'" : "'");
     }
     text += " \\\n    '*:file:_files' ;;\n";
@@ -166,11 +169,12 @@ std::string fishCompletion(const CLI::App& app) {
   for (const CLI::App* command : commandsOf(app)) {
     const std::string& name = command->get_name();
     text += "complete -c hapticd -n __fish_use_subcommand -f -a " + name + " -d '" +
-            plain(command->get_description()) + "'\n";
+            plain(command->get_description(), kOfFish) + "'\n";
     for (const CLI::Option* option : optionsOf(*command)) {
       for (const std::string& each : option->get_lnames()) {
         text += "complete -c hapticd -n '__fish_seen_subcommand_from " + name + "' -l " + each +
-                (takesValue(*option) ? " -r" : "") + " -d '" + plain(option->get_description()) + "'\n";
+                (takesValue(*option) ? " -r" : "") + " -d '" + plain(option->get_description(), kOfFish) +
+                "'\n";
       }
     }
   }

@@ -226,8 +226,8 @@ int run(const RecordOptions& options) {
   if (!samples && extension != ".vrpn") {
     throw std::runtime_error("'" + options.file +
                              "': a client records to a file called *.vrpn, *.csv or *.mcap; the server "
-                             "itself writes recordings that can be "
-                             "replayed: hapticd serve --record FILE.haptics");
+                             "itself writes recordings that can be replayed: hapticd record " +
+                             options.server + " --server, or hapticd serve --record FILE.haptics");
   }
   const StopSignals signals;
   const std::size_t count = samples ? recordTicks(options) : recordMessages(options);

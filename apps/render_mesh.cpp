@@ -179,10 +179,10 @@ int renderMesh(const MeshRenderOptions& options) {
   Summary summary = follow(options, *hand, *snapshot, out);
   out.close();
   if (summary.touching == 0) {
-    std::fprintf(stderr,
-                 "hapticd: the hand never touched the mesh: the hand is at %s; the mesh at %s. "
-                 "--size-mm scales and centres the mesh\n",
-                 millimetres(summary.hips_m).c_str(), millimetres(bounds_m).c_str());
+    std::fprintf(stderr, "hapticd: the hand never touched the mesh: the hand is at %s; the mesh at %s. %s\n",
+                 millimetres(summary.hips_m).c_str(), millimetres(bounds_m).c_str(),
+                 device::Trajectory::isNameOf(options.hand) ? "--mesh-unit and --traj-unit set the units"
+                                                            : "--size-mm scales and centres the mesh");
   }
 
   rusage usage{};

@@ -118,7 +118,9 @@ void addStop(CLI::App& app) {
   auto options = std::make_shared<StopOptions>();
   CLI::App* command =
       app.add_subcommand("stop", "Bring the force of a device to zero immediately, until re-armed");
-  command->add_option("server", options->server, "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH")
+  command
+      ->add_option("server,--server", options->server,
+                   "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH")
       ->capture_default_str();
   command->add_flag("--rearm", options->rearm, "End a stop and clear latched faults");
   addTokenFile(*command, options->tokenFile);

@@ -15,6 +15,7 @@
 #include "net/local_socket.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
+#include "stop_signals.h"
 #include "tls/tls.h"
 #include "token_file.h"
 #include "wire/bytes.h"
@@ -81,6 +82,14 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
     far_.start(std::move(far));
   }
 
+  void end(const std::string& why) {
+    if (!onGone_) return;
+    std::fprintf(stderr, "hapticd: client disconnected: %s\n", why.c_str());
+    near_.close(why);
+    far_.close(why);
+    std::exchange(onGone_, nullptr)();
+  }
+
  private:
   static constexpr std::size_t kMostQueued = std::size_t{1} << 19;
 
@@ -110,14 +119,6 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
     to.send(std::make_shared<const net::Buffer>(std::move(bytes)));
     to.flush();
     if (to.statistics().queuedBytes > kMostQueued) from.pauseReading();
-  }
-
-  void end(const std::string& why) {
-    if (!onGone_) return;
-    std::fprintf(stderr, "hapticd: client disconnected: %s\n", why.c_str());
-    near_.close(why);
-    far_.close(why);
-    std::exchange(onGone_, nullptr)();
   }
 
   net::Connection near_;
@@ -209,9 +210,12 @@ int run(const TunnelOptions& options) {
                                      from.text().c_str(), at.c_str());
                       },
                   .onRefused = {}});
+  const StopSignals signals;
   std::printf("clients open NAME@tcp://%s; connections go to %s\n", at.c_str(), server.text().c_str());
   std::fflush(stdout);
-  loop.run();
+  while (!stopRequested()) loop.runOnce(200ms);
+  for (const std::shared_ptr<Carrier>& carrier : std::list(carriers)) carrier->end("the tunnel ends");
+  loop.runOnce(0ms);  // forgets them
   return 0;
 }
 

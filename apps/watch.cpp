@@ -145,7 +145,7 @@ void addWatch(CLI::App& app) {
   auto options = std::make_shared<WatchOptions>();
   CLI::App* command =
       app.add_subcommand("watch", "Show pose, contact and force live, or stream them to other programs");
-  command->add_option("server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
+  command->add_option("server,--server", options->server, "NAME@host[:port] or NAME@tcp://host[:port]")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long to watch; 0: until Ctrl-C")
       ->check(within(0, kLongest_s))

@@ -577,8 +577,8 @@ class Client(Core):
 
     def reports(self, kind: str, seconds: float = float("inf")) -> Iterator[Any]:
         """Iterates over the reports of one kind, as they arrive, for so many seconds: "pose", "force", "tick" and so
-        on, see hapticd.reports.KINDS. Raises as poll(), and ConnectionLost when the connection ends and
-        Options.reconnect is false."""
+        on, see hapticd.reports.KINDS; "tick", "contacts" and "hand" arrive only after subscribe(). Raises as poll(), and
+        ConnectionLost when the connection ends and Options.reconnect is false."""
         waiting: Deque[Any] = deque()
         with self.on(kind, waiting.append):
             deadline = time.monotonic() + duration(seconds)

@@ -39,6 +39,9 @@ std::string reason() {
   const unsigned long code = ERR_peek_last_error();
   const char* const text = code != 0 ? ERR_reason_error_string(code) : nullptr;
   ERR_clear_error();
+  // So OpenSSL names the first bytes of any other protocol.
+  if (ERR_GET_LIB(code) == ERR_LIB_SSL && ERR_GET_REASON(code) == SSL_R_WRONG_VERSION_NUMBER)
+    return "the peer speaks no TLS";
   return text != nullptr ? text : "no reason given";
 }
 

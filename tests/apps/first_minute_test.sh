@@ -42,6 +42,10 @@ grep -qa '"triangles":3674' <&3
 kill -TERM "$(pgrep -P "$demo" hapticd || echo "$demo")"
 wait "$demo"
 
+without_rights demo --listen 127.0.0.1:0 --http off --seconds 1 >"$work/demo"
+! grep -n browser "$work/demo" || exit 1
+grep -q '^  watch: ' "$work/demo"
+
 without_rights self-test --seconds 0.2
 
 "$hapticd" --version | head -1 | grep -qE '^hapticd [0-9]+\.[0-9]+\.[0-9]+ \(.+\)$'
@@ -57,11 +61,13 @@ done
 for page in $(command -v man >/dev/null && echo "$work"/share/man/man1/*.1); do
   [ -z "$(man --warnings -l "$page" 2>&1 >/dev/null)" ] || { man --warnings -l "$page" 2>&1 >/dev/null | head; exit 1; }
 done
+grep -qFx '[OPTIONS] [server]' "$work/share/man/man1/hapticd-stop.1"
 # Lines of an option stay lines, a page has no empty part, and the documents are where the package has them.
 grep -qFx .br "$work/share/man/man1/hapticd-serve.1"
 ! grep -A1 -x '.SH OPTIONS' "$work/share/man/man1/hapticd-bench.1" | grep -qx '.SH SEE ALSO' || exit 1
 grep -q 'hapticd bench .*help' "$work/share/man/man1/hapticd-bench.1"
 for page in "$work"/share/man/man1/*.1; do tail -1 "$page" | grep -qx /usr/share/doc/hapticd-doc; done
+grep -qF "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH" "$work/share/fish/vendor_completions.d/hapticd.fish"
 completes() { # completes WORD...: what bash offers for the last word, one a line
   (cd "$work/files" && . "$work/share/bash-completion/completions/hapticd" && COMP_WORDS=(hapticd "$@") COMP_CWORD=$# && _hapticd && printf '%s\n' "${COMPREPLY[@]}")
 }

@@ -64,6 +64,11 @@ refused 1 "deep.gltf': its reader crashed" "$hapticd" touch "$work/deep.gltf"
 printf 'OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' >"$work/three.off"
 refused 1 "three.off': the format '.off' is not supported" "$hapticd" touch "$work/three.off"
 
+refused 1 "replayed: hapticd record Phantom@tcp://$address --server, or" "$hapticd" record "Phantom@tcp://$address" "$work/own.haptics"
+# What is odd about a hand file is said once.
+printf 'time_s,hand_x_m,hand_y_m,hand_z_m\n0,0,0,0\n1,0.01,0,0\n' >"$work/old.csv"
+"$hapticd" serve --listen 127.0.0.1:0 --http off --hand "$work/old.csv" --seconds 0.2 >"$work/said" 2>&1
+[ "$(grep -c 'columns of an older version' "$work/said")" = 1 ] || { cat "$work/said"; exit 1; }
 # Nothing is overwritten without --force.
 "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3
 refused 1 "exists: choose another name, or overwrite it by --force" "$hapticd" record "Phantom@tcp://$address" "$work/own.csv" --seconds 0.3

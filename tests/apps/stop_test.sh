@@ -13,6 +13,14 @@ awk '/peak force/ { if ($3 != 0) force = 1 } END { exit force }' "$work/stopped"
 awk '/peak force/ { if ($3 > 0.1) force = 1 } END { exit !force }' "$work/rearmed" || { cat "$work/rearmed"; exit 1; }
 grep -q 'stops the forces' "$work/log"
 
+# As touch and mark name the server: a stop does not fail at the word.
+"$hapticd" stop --server "Phantom@tcp://$address" | grep -q 'forces are off'
+"$hapticd" stop --rearm --server "Phantom@tcp://$address" | grep -q 'forces ramp in'
+"$hapticd" watch --server "Phantom@tcp://$address" --seconds 0.2 | grep -q '^summary'
+status=0
+"$hapticd" stop "Phantom@tcp://$address" --server "Phantom@$address" >"$work/out" 2>&1 || status=$?
+[ "$status" = 2 ] && grep -q 'more than once' "$work/out" || { cat "$work/out"; exit 1; }
+
 status=0
 "$hapticd" stop "Phantom@127.0.0.1:1" >"$work/out" 2>&1 || status=$?
 [ "$status" = 1 ]

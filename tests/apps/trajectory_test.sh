@@ -65,6 +65,12 @@ expect 'add --traj-force surface' error.txt
 feel --hand probe.traj --compare probe.traj >raw.txt 2>error.txt
 expect 'both 0, only rendered 0, only in the file' raw.txt
 
+# In a wrong unit it is elsewhere; what is refused with a trajectory is no remedy.
+feel --hand in.traj --traj-unit m >far.txt 2>error.txt
+expect 'the hand never touched the mesh' error.txt
+expect '--traj-unit' error.txt
+! grep -- --size-mm error.txt || exit 1
+
 # A CSV hand has the clock of the file only if it was written so.
 awk -F'[ ]' 'BEGIN { print "t_s,x_m,y_m,z_m" } !/^#/ { print $1 "," $2 / 1000 "," $3 / 1000 "," $4 / 1000 }' OFMT=%.9g CONVFMT=%.9g in.traj >in.csv
 feel --hand in.csv --compare probe.traj >csv.txt

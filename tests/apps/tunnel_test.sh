@@ -74,10 +74,22 @@ grep -q 'Recording_Control refused: ' "$work/out" || { cat "$work/out"; exit 1; 
 refused timeout 10 "$hapticd" stop "Phantom@$local"
 grep -q 'carries tcp:// only' "$work/tunnel" || { cat "$work/tunnel"; exit 1; }
 
+# It ends as the other commands do that run until they are told to.
+kill "$observers"
+wait "$observers"
+
+# A server without TLS is called so.
+"$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt >"$work/plain" 2>&1 &
+plain=$!
+trap 'kill $server $tunnel $plain 2>/dev/null || true; rm -rf "$work"' EXIT
+refused timeout 20 "$hapticd" tunnel "$(await "$work/plain" 'listening on ([0-9.]+:[0-9]+)')" --port 0 --fingerprint "$fingerprint"
+grep -q 'the peer speaks no TLS' "$work/out" || { cat "$work/out"; exit 1; }
+kill "$plain"
+
 # Behind a tunnel that does not reach its server, the tunnel is not what is missing.
 "$hapticd" tunnel "unix:$work/server.sock" --port 0 >"$work/nowhere" 2>&1 &
 nowhere=$!
-trap 'kill $server $tunnel $observers $nowhere 2>/dev/null || true; rm -rf "$work"' EXIT
+trap 'kill $server $tunnel $nowhere 2>/dev/null || true; rm -rf "$work"' EXIT
 behind=$(await "$work/nowhere" '(tcp:\/\/[0-9.]+:[0-9]+);')
 mv "$work/server.sock" "$work/moved.sock"
 refused "$hapticd" stop "Phantom@$behind"

@@ -1,5 +1,3 @@
-#include <cstdio>
-
 #include "device/driver.h"
 #include "device/simulated/hand_file.h"
 #include "device/simulated/simulated_device.h"
@@ -14,11 +12,12 @@ const Driver simulated{.name = "simulated",
                        .hasHand = true,
                        .canBeIsolated = false,
                        .make = [](const DriverOptions& options) -> std::unique_ptr<Device> {
-                         auto device = std::make_unique<SimulatedDevice>();
-                         if (options.hand == "script") return device;
+                         if (options.hand == "script") return std::make_unique<SimulatedDevice>();
                          const auto hand = HandFile::load(options.hand);
+                         SimulatedOptions withRemark;
                          if (!hand->remark().empty())
-                           std::fprintf(stderr, "%s: %s\n", options.hand.c_str(), hand->remark().c_str());
+                           withRemark.remark = options.hand + ": " + hand->remark();
+                         auto device = std::make_unique<SimulatedDevice>(withRemark);
                          device->setPath(hand);
                          return device;
                        }};

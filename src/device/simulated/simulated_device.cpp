@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -26,6 +27,7 @@ SimulatedDevice::SimulatedDevice(const SimulatedOptions& options) : options_(opt
 }
 
 void SimulatedDevice::open() {
+  if (!options_.remark.empty()) std::fprintf(stderr, "%s\n", options_.remark.c_str());
   started_ = false;
   force_N_.setZero();
 }

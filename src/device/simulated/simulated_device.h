@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <memory>
+#include <string>
 
 #include "device/device.h"
 #include "device/profiles.h"
@@ -24,6 +25,8 @@ struct SimulatedOptions {
   bool openLoop = false;
   /// Speed of the intended position after a change of its source, and always towards a target.
   double reachSpeed_m_per_s = 0.5;
+  /// On the file of the path; open() prints it.
+  std::string remark = {};
 };
 
 /// Without a path and a target the hand rests at the centre of the workspace.
