@@ -151,15 +151,15 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   if (entry.value.running) tellOfSum(call);
 }
 
-// Warns the client whose effect brings the sum above the passivity bound.
+// Warns the client whose effect is lowered beside what else acts.
 void FreeForces::tellOfSum(const Call& call) const {
-  const double load = bound_.loadOf(sumOfEffects());
-  if (load == 0) return;
-  const long percent = std::lround(100 * bound_.shareOf(load + heaviestSurface_Ns_per_m_));
+  if (bound_.loadOf(sumOfEffects()) == 0) return;
+  const long percent = std::lround(100 * shareTogether(load_Ns_per_m(worldUnitsPerMetre_)));
   if (percent < 100)
     call.warn(
         "startEffect",
-        "all effects together, with the surfaces, would be unstable on this device: their gains are lowered",
+        "all effects together, with the fields and surfaces, would be unstable on this device: their gains "
+        "are lowered",
         " to ", percent, " %");
 }
 

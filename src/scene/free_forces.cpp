@@ -199,6 +199,23 @@ void FreeForces::tellOfFields(const PublishedForces& forces, double worldUnitsPe
     tell("constraint_KSpring", *asked, constraint_->owner, constraintTold_);
 }
 
+// Once for each owner and share: stock clients send their planes all the time.
+void FreeForces::tellOfPlanes(const PublishedForces& forces, Nanos now, NoticeBoard& board,
+                              std::vector<Notice>& out) {
+  for (const Plane& given : forces.planes) {
+    const Owned<Plane>& asked = planes_.at(given.index);
+    const double load = loadOf(asked.value.surface, bound_);
+    if (given.releasing || load == 0) continue;
+    const PlaneShare share{asked.owner, std::lround(100 * loadOf(given.surface, bound_) / load)};
+    if (std::exchange(planesTold_[static_cast<std::size_t>(given.index)], share) == share) continue;
+    if (share.percent == 100) continue;
+    const Call call{asked.owner, now, false, board, out};
+    call.warn("sendSurface",
+              "would be unstable on this device beside the effects and fields that run, and is lowered",
+              " plane ", given.index, " to ", share.percent, " %");
+  }
+}
+
 PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double heaviestSurface_Ns_per_m,
                                     NoticeBoard& board, std::vector<Notice>& out) {
   heaviestSurface_Ns_per_m_ = heaviestSurface_Ns_per_m;
@@ -224,6 +241,7 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double
   forces.fields = passiveFields(worldUnitsPerMetre);
   keepPassiveTogether(forces, worldUnitsPerMetre);
   tellOfFields(forces, worldUnitsPerMetre, now, board, out);
+  tellOfPlanes(forces, now, board, out);
   if (buzz_) forces.buzz = buzz_->value;
   return forces;
 }

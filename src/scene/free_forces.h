@@ -3,6 +3,7 @@
 // replaces nothing of it.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <map>
 #include <memory>
@@ -71,6 +72,14 @@ struct FieldShare {
   bool operator==(const FieldShare&) const = default;
 };
 
+/// The same of a plane, and who was told.
+struct PlaneShare {
+  ClientId owner = 0;
+  long percent = 100;
+
+  bool operator==(const PlaneShare&) const = default;
+};
+
 /// All of them, by index. A command checks all of its values before it changes anything.
 class FreeForces {
  public:
@@ -95,7 +104,7 @@ class FreeForces {
   double load_Ns_per_m(double worldUnitsPerMetre) const;
   /// Force fields depend on the workspace: a stiff one is kept passive in device metres, and its owner is
   /// told. Effects and fields are lowered to stay within the passivity bound together with the planes and
-  /// with the surfaces of objects, of which the largest load is given.
+  /// with the surfaces of objects, of which the largest load is given, and planes beside them.
   PublishedForces publish(Nanos now, double worldUnitsPerMetre, double heaviestSurface_Ns_per_m,
                           NoticeBoard& board, std::vector<Notice>& out);
   /// Appends all of them, running or not.
@@ -141,6 +150,7 @@ class FreeForces {
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre);
   void tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now, NoticeBoard& board,
                     std::vector<Notice>& out);
+  void tellOfPlanes(const PublishedForces& forces, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   Constraint& constraintFor(const Call& call);
   void letFieldLeave();
 
@@ -166,6 +176,7 @@ class FreeForces {
   double share_ = 1;                     // then, of what does not ramp out
   FieldShare fieldTold_;
   FieldShare constraintTold_;
+  std::array<PlaneShare, kMaxPlanes> planesTold_;  // by index
   bool changed_ = false;
 };
 

@@ -299,17 +299,58 @@ TEST_F(Forces, SurfacesEffectsAndFieldsTogetherStayWithinTheBound) {
   EXPECT_EQ(alone()[0], asked[0]) << "0.5 beside 3";
   EXPECT_EQ(alone()[2], asked[2]);
   std::vector<ClientId> told;
+  std::string texts;
   for (const Notice& notice : notices_) {
     told.push_back(notice.client);
-    EXPECT_THAT(notice.text,
-                HasSubstr(notice.client == kOther ? "surface of object 1 to 77 %" : "sendForceField"));
+    texts += notice.text + "\n";
   }
-  EXPECT_THAT(told, ::testing::UnorderedElementsAre(7, kOther));
+  EXPECT_THAT(told, ::testing::UnorderedElementsAre(7, 7, kOther)) << texts;
+  for (const char* text : {"sendForceField", "sendSurface plane 0 to 67 %", "surface of object 1 to 77 %"})
+    EXPECT_THAT(texts, HasSubstr(text));
 
   say(StopEffect{1});
   say(SetForceField{});
   ASSERT_TRUE(publish());
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(alone()[i], asked[i]) << i << " as before";
+}
+
+// Whoever sets what is lowered learns so, whichever of them came first.
+TEST_F(Forces, ClientsLearnThatWhatTheySetIsLoweredBesidePlanesAndFields) {
+  const auto texts = [this](ClientId client) {
+    std::string all;
+    for (const Notice& notice : notices_) {
+      if (notice.client == client) all += notice.text + "\n";
+    }
+    return all;
+  };
+  const auto startSpring = [this] {
+    say(DefineEffect{.type = "spring", .index = 1, .gain = 9, .magnitude_N = 1});
+    say(StartEffect{1});
+  };
+  const SetPlane plane{.plane = {0, 0, 1, 0}, .stiffness = 1, .damping = 0.004F};
+  const SetForceField field{.jacobian_N_per_m = {-2000, 0, 0, 0, -2000, 0, 0, 0, -2000}, .radius_m = 1};
+
+  say(plane, kOther);
+  ASSERT_TRUE(publish());
+  EXPECT_TRUE(notices_.empty());
+  startSpring();
+  ASSERT_TRUE(publish());
+  EXPECT_THAT(texts(7), HasSubstr("startEffect to 55 %"));
+  EXPECT_THAT(texts(kOther), HasSubstr("sendSurface plane 0 to 55 %"));
+  notices_.clear();
+  say(plane, kOther);
+  ASSERT_TRUE(publish());
+  EXPECT_TRUE(notices_.empty()) << "once for each share: stock clients send their planes all the time";
+
+  say(StopEffect{1});
+  say(SetPlane{}, kOther);
+  say(field, kOther);
+  ASSERT_TRUE(publish());
+  EXPECT_TRUE(notices_.empty());
+  startSpring();
+  ASSERT_TRUE(publish());
+  EXPECT_THAT(texts(7), HasSubstr("startEffect to 91 %"));
+  EXPECT_THAT(texts(kOther), HasSubstr("sendForceField"));
 }
 
 // Its slope there is a stiffness as any other.
@@ -358,9 +399,11 @@ TEST_F(Forces, OwnersOfLoweredFieldsAreTold) {
   say(DefineEffect{.type = "spring", .index = 1, .gain = 9, .magnitude_N = 1});
   say(StartEffect{1});
   publish();
-  ASSERT_EQ(notices_.size(), 1U);
-  EXPECT_EQ(notices_[0].client, kOther);
-  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("constraint_KSpring, stiffness 6000 to 3996 N/m"));
+  ASSERT_EQ(notices_.size(), 2U);
+  EXPECT_EQ(notices_[0].client, 7U);
+  EXPECT_THAT(notices_[0].text, HasSubstr("startEffect to 67 %"));
+  EXPECT_EQ(notices_[1].client, kOther);
+  EXPECT_THAT(notices_[1].text, HasSubstr("constraint_KSpring, stiffness 6000 to 3996 N/m"));
 }
 
 TEST_F(Forces, NegativeAndUnstableParametersAreLowered) {
