@@ -15,6 +15,8 @@ namespace {
 using scene::Effect;
 using scene::EffectType;
 
+constexpr double kFarthestAnchor_m = 1e30;
+
 Vec3 atMost(const Vec3& force, double limit) {
   const double size = force.norm();
   return size > limit ? Vec3(force * (limit / size)) : force;
@@ -90,7 +92,8 @@ void Effects::resume(const RenderMemory& memory) noexcept {
 void Effects::Running::changeFriction(double gain, double limit_N, const Vec3& proxy) noexcept {
   if (gain != frictionGain && gain > 0 && frictionGain > 0)
     anchor = proxy + frictionForce(frictionGain, frictionLimit_N, proxy, anchor) / gain;
-  if (!(gain > 0)) return anchorAt(proxy);
+  // With hardly any gain, no anchor exerts the force.
+  if (!(gain > 0) || !(anchor.cwiseAbs().maxCoeff() <= kFarthestAnchor_m)) anchorAt(proxy);
   frictionGain = gain;
   frictionLimit_N = limit_N;
 }
