@@ -90,6 +90,20 @@ TEST_P(FreeForcesTest, friction_drags_its_anchor_along) {
   EXPECT_NEAR(to({0.005, 0, 0}).force_N.x(), 1.0, 1e-6);
 }
 
+TEST_P(FreeForcesTest, friction_begins_where_the_hand_is_in_the_tick_in_which_it_begins) {
+  for (const bool wasFriction : {true, false}) {
+    scene::Effect e = effect(wasFriction ? EffectType::friction : EffectType::constant);
+    e.gain = 0;
+    run(e);
+    start({0, 0, 0});
+    at({0.001, 0, 0});
+    run(effect(EffectType::friction));
+    hand->show(scene.snapshot());
+    EXPECT_EQ(at({0.003, 0, 0}).force_N.norm(), 0);
+    EXPECT_NEAR(at({0.005, 0, 0}).force_N.x(), -1, 1e-9);
+  }
+}
+
 TEST_P(FreeForcesTest, friction_of_hardly_any_gain_is_none) {
   scene::Effect rubbing = effect(EffectType::friction);
   rubbing.gain = 9990;
