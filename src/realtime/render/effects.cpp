@@ -15,6 +15,8 @@ namespace {
 using scene::Effect;
 using scene::EffectType;
 
+constexpr double kFarthestAnchor_m = 1e30;
+
 Vec3 atMost(const Vec3& force, double limit) {
   const double size = force.norm();
   return size > limit ? Vec3(force * (limit / size)) : force;
@@ -82,15 +84,19 @@ void Effects::resume(const RenderMemory& memory) noexcept {
     }
     r.begin = known->begin;
     r.anchor = known->anchor;
+    r.rubs = true;
     r.phase.resume(*known);
   }
 }
 
-// With the new gain the anchor exerts the force that it did.
+// With the new gain the anchor exerts the force that it did. What begins to rub begins where the hand is.
 void Effects::Running::changeFriction(double gain, double limit_N, const Vec3& proxy) noexcept {
+  if (!rubs) anchor = proxy;
   if (gain != frictionGain && gain > 0 && frictionGain > 0)
     anchor = proxy + frictionForce(frictionGain, frictionLimit_N, proxy, anchor) / gain;
-  if (!(gain > 0)) return anchorAt(proxy);
+  // With hardly any gain, no anchor exerts the force.
+  if (!(gain > 0) || !(anchor.cwiseAbs().maxCoeff() <= kFarthestAnchor_m)) return anchorAt(proxy);
+  rubs = true;
   frictionGain = gain;
   frictionLimit_N = limit_N;
 }
@@ -107,7 +113,7 @@ Effects::Running* Effects::running(const Effect& effect, Nanos now, const Vec3& 
   if (Running* const known = find(effect)) return known;
   if (count_ == static_cast<int>(running_.size())) return nullptr;
   Running& fresh = running_[static_cast<std::size_t>(count_++)];
-  fresh = {effect.index, effect.start, now, -1, proxy, true, {}, 0, 0};
+  fresh = {effect.index, effect.start, now, -1, proxy, true, {}, false, 0, 0};
   return &fresh;
 }
 

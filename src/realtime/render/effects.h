@@ -51,12 +51,14 @@ class Effects {
     Vec3 anchor = Vec3::Zero();  ///< of a friction effect, device frame
     bool seen = false;
     Phase phase;
-    double frictionGain = 0;  ///< of the last tick; 0: it did not rub
+    bool rubs = false;        ///< a friction effect, in the last tick
+    double frictionGain = 0;  ///< of the last tick; 0: it did not rub, or nobody remembers
     double frictionLimit_N = 0;
 
     void changeFriction(double gain, double limit_N, const Vec3& proxy) noexcept;
     void anchorAt(const Vec3& proxy) noexcept {
       anchor = proxy;
+      rubs = false;
       frictionGain = 0;
     }
   };

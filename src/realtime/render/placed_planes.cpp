@@ -14,6 +14,13 @@ constexpr double kPlaneSkin = 1e-9;  // of the largest coordinate of the HIP
 constexpr double kTau = 2 * M_PI;
 constexpr double kFastest_m_per_s = 1;
 
+// What is left to rise after a placement.
+double missingOf(const scene::Plane& plane, double depth_m, Nanos age) noexcept {
+  const double age_s = base::toSeconds(age);
+  const double recovery_s = std::max(base::toSeconds(plane.recovery), depth_m / kFastest_m_per_s);
+  return age_s < recovery_s ? depth_m * (1 - age_s / recovery_s) : 0;
+}
+
 std::array<double, 6> detailOf(const scene::Plane& plane) noexcept {
   return {plane.adhesionNormal_N,  plane.adhesionLateral_N, plane.textureAmplitude,
           plane.textureWavelength, plane.buzzAmplitude,     plane.buzzAngularFrequency_rad_per_s};
@@ -21,10 +28,10 @@ std::array<double, 6> detailOf(const scene::Plane& plane) noexcept {
 
 }  // namespace
 
-// A plane that moves while it is felt rises from where the HIP is below it already.
-
+// A plane that moves while it is felt rises from where the HIP is below it already: by what the placement
+// added, and not by what the HIP has sunk since the last tick.
 PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos now, double depth_m,
-                                             bool& fresh) noexcept {
+                                             double sunk_m, bool& fresh) noexcept {
   const auto end = memory_.begin() + memoryCount_;
   const auto known =
       std::find_if(memory_.begin(), end, [&](const Memory& m) { return m.index == plane.index; });
@@ -39,7 +46,8 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
   known->detail = detailOf(plane);
   const bool goesOn = known != end && before.releaseBegin < 0;
   known->buzzing = goesOn ? before.buzzing : now;
-  known->depth_m = std::max(0.0, depth_m + (goesOn ? before.wave_m : 0) - before.under_m);
+  const double under_m = std::clamp(before.level_m + sunk_m, 0.0, before.under_m + std::max(0.0, sunk_m));
+  known->depth_m = std::max(0.0, depth_m + (goesOn ? before.wave_m : 0) - under_m);
   known->leftOut = before.leftOut;
   if (before.touched && before.releaseBegin < 0) {
     known->touched = true;
@@ -52,12 +60,10 @@ PlacedPlanes::Memory& PlacedPlanes::memoryOf(const scene::Plane& plane, Nanos no
 // Height of the surface above the plane itself, metres.
 double PlacedPlanes::heightOf(const scene::Plane& plane, Memory& memory, Nanos now,
                               double metresPerUnit) const noexcept {
-  const double age = base::toSeconds(now - memory.placed);
-  const double recovery = std::max(base::toSeconds(plane.recovery), memory.depth_m / kFastest_m_per_s);
   const auto onDevice = [&](double amplitude) {
     return std::min(metresPerUnit * amplitude, scene::kHighestDetail_m);
   };
-  const double missing_m = age < recovery ? memory.depth_m * (1 - age / recovery) : 0;
+  const double missing_m = missingOf(plane, memory.depth_m, now - memory.placed);
   double texture_m = 0;
   if (plane.textureWavelength > 0) {
     // The first contact becomes the centre of the texture, so the HIP always meets a crest.
@@ -131,6 +137,7 @@ void PlacedPlanes::place(const scene::SceneSnapshot& scene, Nanos now, const Vec
     if (placeOne(now, hip, toolRadius_m, placed)) ++count_;
   }
   anew_ = false;
+  hip_ = hip;
 }
 
 bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, PlacedPlane& placed) noexcept {
@@ -142,14 +149,17 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
   const double hipHeight = (plane.normal.dot(T_world_device_ * hip) + plane.offset) / unitsPerMetre;
   bool fresh = false;
   const double depth_m = toolRadius_m - hipHeight;
-  Memory& memory = memoryOf(plane, now, depth_m, fresh);
+  const double sunk_m = anew_ ? -std::numeric_limits<double>::infinity() : normal.dot(hip_ - hip);
+  Memory& memory = memoryOf(plane, now, depth_m, sunk_m, fresh);
   if (anew_) memory.touched = memory.adheres = false;
   // As with objects, the hand is not lifted out of what came around it.
-  const bool cameDeep = fresh ? memory.depth_m > kLongestMotion_m
-                              : viewMoved_ && memory.under_m == 0 && depth_m > kLongestMotion_m;
+  const double missing_m = missingOf(plane, memory.depth_m, now - memory.placed);
+  const double rise_m = depth_m + memory.wave_m - missing_m - std::max(0.0, memory.level_m + sunk_m);
+  const bool cameDeep = fresh ? memory.depth_m > kLongestMotion_m : viewMoved_ && rise_m > kLongestMotion_m;
   memory.leftOut = (anew_ || cameDeep || memory.leftOut) && depth_m > 0;
   leavesOut_ |= memory.leftOut;
   memory.under_m = 0;
+  memory.level_m = -std::numeric_limits<double>::infinity();
 
   memory.surface = placed.surface = plane.surface;
   memory.detail = detailOf(plane);
@@ -162,7 +172,8 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
   placed.surface.damping_Ns_per_m *= left;
   const double whole = heightOf(plane, memory, now, 1 / unitsPerMetre);
   // It sinks instead of becoming softer, so that what is below it holds the hand in time.
-  memory.under_m = left * std::max(0.0, depth_m + whole);
+  memory.level_m = depth_m + whole;
+  memory.under_m = left * std::max(0.0, memory.level_m);
   const double raised = left == 1 ? whole : std::min(whole, memory.under_m - depth_m);
   placed.still = !fresh && left == 1 && raised == std::exchange(memory.raised_m, raised);
   placed.rests = placed.still && !viewMoved_;

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "base/time.h"
 #include "realtime/render/facet.h"
@@ -70,6 +71,8 @@ class PlacedPlanes {
     Nanos releaseBegin = -1;
     double depth_m = 0;  ///< by which the placement brought the HIP below it
     double under_m = 0;  ///< of the HIP below the surface, in the last tick
+    /// The same as if it did not sink, and negative above it; -infinity: it was not there.
+    double level_m = -std::numeric_limits<double>::infinity();
     scene::Surface surface;
     std::array<double, 6> detail{};  ///< adhesion, texture, buzz
     double wave_m = 0;               ///< height of texture and buzz, in the last tick
@@ -81,7 +84,7 @@ class PlacedPlanes {
     Vec3 firstContact = Vec3::Zero();  ///< world frame
   };
 
-  Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, bool& fresh) noexcept;
+  Memory& memoryOf(const scene::Plane& plane, Nanos now, double depth_m, double sunk_m, bool& fresh) noexcept;
   void forgetAllExcept(const scene::SceneSnapshot& scene) noexcept;
   bool changes(const scene::SceneSnapshot& scene) const noexcept;
   void followJump(const ViewMotion& view) noexcept;
@@ -99,6 +102,7 @@ class PlacedPlanes {
   geometry::Affine T_world_device_ = geometry::Affine::Identity();
   Vec3 proxy_ = Vec3::Zero();          // at the end of the last tick, world frame
   Vec3 proxyOnDevice_ = Vec3::Zero();  // the same in device metres
+  Vec3 hip_ = Vec3::Zero();            // in the last tick, device metres
   bool leavesOut_ = false;
 };
 

@@ -31,6 +31,7 @@ Guard::Guard(const GuardOptions& options, const GuardControl& control, Nanos nom
 Vec3 Guard::step(const GuardInput& in) noexcept {
   now_ = 0;
   const Vec3 rendered = finite(in.force_N);
+  note(Trip::notFinite, in.notFinite);
   if (!options_.enabled) {
     count();
     report_.gain = 1;

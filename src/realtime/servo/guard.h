@@ -63,6 +63,7 @@ struct GuardInput {
   Nanos late = 0;                              ///< start of this tick minus its deadline
   bool writeFailed = false;                    ///< the device refused the previous force
   bool forceEnded = false;                     ///< the device ended the previous force by itself
+  bool notFinite = false;                      ///< the renderer met a value that is not: its force is zero
   bool geometryJump = false;                   ///< geometry or surface in contact changed at once
   bool deepContact = false;
 };

@@ -219,6 +219,7 @@ GuardInput Tick::guardInput() const noexcept {
   in.late = std::max(report_.timing.wakeupError, report_.timing.period - period_);
   in.writeFailed = !written_;
   in.forceEnded = expired_;
+  in.notFinite = (report_.rendering.status & kRenderNotFinite) != 0;
   in.geometryJump = (report_.rendering.status & kRenderGeometryJump) != 0;
   in.deepContact = (report_.rendering.status & (kRenderReleased | kRenderEnclosed)) != 0;
   return in;

@@ -30,6 +30,12 @@ class FreeForcesTest : public VariantTest {
     scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
     hand->show(scene.snapshot());
   }
+  // The same, moved along z of the variant's world, with or without a hand.
+  void showViewOf(const scene::Workspace& whole, double z_m) {
+    scene.workspace.T_world_device = whole.T_world_device * Affine(Eigen::Translation3d(0, 0, z_m));
+    scene.workspace.T_device_world = scene.workspace.T_world_device.inverse();
+    if (hand) hand->show(scene.snapshot());
+  }
   void addTexture(double amplitude_m, double wavelength_m) {
     scene::Plane plane = floor(0);
     plane.textureAmplitude = units() * amplitude_m;
@@ -82,6 +88,38 @@ TEST_P(FreeForcesTest, friction_drags_its_anchor_along) {
   EXPECT_NEAR(to({0.010, 0, 0}).force_N.x(), -1.5, 1e-6);
   EXPECT_NEAR(to({0.007, 0, 0}).force_N.x(), 0, 1e-6);  // the anchor is 3 mm behind the turn
   EXPECT_NEAR(to({0.005, 0, 0}).force_N.x(), 1.0, 1e-6);
+}
+
+TEST_P(FreeForcesTest, friction_begins_where_the_hand_is_in_the_tick_in_which_it_begins) {
+  for (const bool wasFriction : {true, false}) {
+    scene::Effect e = effect(wasFriction ? EffectType::friction : EffectType::constant);
+    e.gain = 0;
+    run(e);
+    start({0, 0, 0});
+    at({0.001, 0, 0});
+    run(effect(EffectType::friction));
+    hand->show(scene.snapshot());
+    EXPECT_EQ(at({0.003, 0, 0}).force_N.norm(), 0);
+    EXPECT_NEAR(at({0.005, 0, 0}).force_N.x(), -1, 1e-9);
+  }
+}
+
+TEST_P(FreeForcesTest, friction_of_hardly_any_gain_is_none) {
+  scene::Effect rubbing = effect(EffectType::friction);
+  rubbing.gain = 9990;
+  rubbing.magnitude_N = 1000;
+  scene::Effect push = effect(EffectType::constant);
+  push.index = 1;
+  push.direction = Vec3(0, 0, 1);
+  scene.effects = {rubbing, push};
+  start({0, 0, 0});
+  EXPECT_NEAR(to({0.020, 0, 0}).force_N.x(), -199.8, 1e-6);
+  for (const double gain : {3e-308, 1e-300}) {
+    scene.effects[0].gain = gain;
+    hand->show(scene.snapshot());
+    EXPECT_EQ(at({0.020, 0, 0}).status & kRenderNotFinite, 0U) << "the other one goes on";
+    EXPECT_NEAR((hand->now().force_N - Vec3(0, 0, 1.5)).norm(), 0, 1e-9);
+  }
 }
 
 TEST_P(FreeForcesTest, motor_vibration_turns_with_the_stylus) {
@@ -352,6 +390,45 @@ TEST_P(FreeForcesTest, plane_placed_far_above_the_hand_is_left_out_until_the_han
 }
 
 // adhesion  goes on holding while the plane moves, and ends with a report when it is switched off
+// Clients stream planes that are tangent to a surface of their own. The motion of the hand is not the
+// plane's.
+TEST_P(FreeForcesTest, plane_placed_anew_in_each_tick_is_as_stiff_as_one_at_rest) {
+  constexpr double kDepth_m = 0.002;
+  scene::Plane plane = floor(0);
+  const double wanted_N = kDepth_m * plane.surface.stiffness_N_per_m;
+  for (const Nanos recovery : {1 * kTick, 10 * kTick, 1000 * kTick}) {
+    scene.planes = {plane};
+    start({0, 0, 0.001});
+    const auto place = [&](const Rendering&) {
+      ++plane.placement;
+      plane.recovery = recovery;
+      plane.offset += units() * (plane.placement % 2 == 0 ? 1e-9 : -1e-9);
+      scene.planes = {plane};
+      hand->show(scene.snapshot());
+    };
+    to({0, 0, -kDepth_m}, 0.05, place);
+    EXPECT_NEAR(hand->now().force_N.z(), wanted_N, 1e-3 * wanted_N) << recovery / kTick;
+  }
+}
+
+TEST_P(FreeForcesTest, view_that_jumps_with_a_touched_plane_leaves_the_hand_to_itself) {
+  scene.planes = {floor(0)};
+  const scene::Workspace whole = scene.workspace;
+  for (const double jump_m : {0.019, 0.021, 0.5}) {
+    SCOPED_TRACE(jump_m);
+    showViewOf(whole, 0);
+    start({0, 0, 0.001});
+    to({0, 0, -0.001});
+    EXPECT_GT(hand->now().force_N.z(), 0);
+    showViewOf(whole, -jump_m);
+    const bool isLeftOut = (at({0, 0, -0.001}).status & kRenderEnclosed) != 0;
+    EXPECT_EQ(isLeftOut, jump_m > 0.020);
+    EXPECT_EQ(hand->now().force_N.norm() > 0, jump_m < 0.020);
+    to({0, 0, jump_m + 0.001});
+    EXPECT_GT(to({0, 0, jump_m - 0.001}).force_N.z(), 0) << "felt again once the hand has left it";
+  }
+}
+
 TEST_P(FreeForcesTest, adhesion_outlives_a_new_placement) {
   scene.planes = {floor(0)};
   scene.planes[0].adhesionNormal_N = 1.5;

@@ -131,6 +131,20 @@ TEST_F(TickTest, APositionThatIsNotANumberGetsNoForce) {
   EXPECT_NEAR(run(1000 * kMs).force_N.y(), 3, 1e-9);
 }
 
+// The renderer has set the force to zero by then.
+TEST_F(TickTest, AnOrientationThatIsNotANumberTripsAndForcesRampIn) {
+  tick.snapshots().publish(constantForce(7, Vec3(0, 2, 0)));
+  EXPECT_NEAR(run(1000 * kMs).force_N.y(), 2, 1e-9);
+  const Eigen::Quaterniond orientation = device.state.orientation;
+  device.state.orientation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(run(kMs).force_N, Vec3::Zero());
+  EXPECT_NE(tick.last().guard.active & bit(Trip::notFinite), 0U);
+  device.state.orientation = orientation;
+  run(kMs);
+  EXPECT_EQ(tick.last().guard.active & bit(Trip::notFinite), 0U);
+  EXPECT_NEAR(run(250 * kMs).force_N.y(), 1, 0.02);
+}
+
 TEST_F(TickTest, ALatePacerAndALongPeriodAreBothLate) {
   tick.snapshots().publish(constantForce(1, Vec3(0, 3, 0)));
   run(1000 * kMs);
