@@ -389,7 +389,6 @@ TEST_P(FreeForcesTest, plane_placed_far_above_the_hand_is_left_out_until_the_han
   }
 }
 
-// adhesion  goes on holding while the plane moves, and ends with a report when it is switched off
 // Clients stream planes that are tangent to a surface of their own. The motion of the hand is not the
 // plane's.
 TEST_P(FreeForcesTest, plane_placed_anew_in_each_tick_is_as_stiff_as_one_at_rest) {
@@ -429,6 +428,7 @@ TEST_P(FreeForcesTest, view_that_jumps_with_a_touched_plane_leaves_the_hand_to_i
   }
 }
 
+// adhesion  goes on holding while the plane moves, and ends with a report when it is switched off
 TEST_P(FreeForcesTest, adhesion_outlives_a_new_placement) {
   scene.planes = {floor(0)};
   scene.planes[0].adhesionNormal_N = 1.5;
