@@ -156,6 +156,7 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
   const Nanos at = edited ? lastEdit_ : 0;
   const auto add = [&](SceneCommand command) { out.push_back({client, std::move(command), at}); };
   const std::vector<Vec3f>& vertices = positionsAreUnderWay() ? current_->shapeVertices() : vertices_.read();
+  if (sparse_) add(SetVertices{object, 1, {vertices[1]}});  // the copy had a gap, too
   inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
     add(SetVertices{object, first, std::move(run)});
   });
