@@ -71,13 +71,16 @@ void MeshDraft::grow(std::vector<Vec3f>& vertices, std::size_t size) {
 }
 
 std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now) {
-  const std::size_t end = first + run.size();
   const std::size_t before = vertexCount();
-  const bool inPlace = end <= before;
-  if (inPlace && sameBytes(vertices_.read().data() + first, run)) return 0;
+  const auto isInPlace = [&] { return first + run.size() <= before; };
+  if (isInPlace() && sameBytes(vertices_.read().data() + first, run)) return 0;
   std::size_t refused = 0;
+  // A refused vertex at the end is none that has not come yet.
+  for (; !run.empty() && !isVertex(run.back()); ++refused) run.pop_back();
+  if (run.empty()) return refused;
   const bool usable = allUsable(run);
-  if (!usable && std::none_of(run.begin(), run.end(), isVertex)) return run.size();
+  const bool inPlace = isInPlace();
+  const std::size_t end = first + run.size();
   if (usable && first == 0 && end >= before) {
     vertices_.replace(std::move(run));
   } else if (usable) {
