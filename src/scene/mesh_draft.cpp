@@ -151,6 +151,7 @@ void inRuns(const std::vector<Item>& items, const Add& add) {
 
 }  // namespace
 
+// Triangles first: without them, vertices would count among the triangles, for which there may be no room.
 // Vertices that have not come are not numbers and stay so; triangles that were removed come with three equal
 // corners and are removed again.
 void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetres,
@@ -159,10 +160,6 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
   const Nanos at = edited ? lastEdit_ : 0;
   const auto add = [&](SceneCommand command) { out.push_back({client, std::move(command), at}); };
   const std::vector<Vec3f>& vertices = positionsAreUnderWay() ? current_->shapeVertices() : vertices_.read();
-  if (sparse_) add(SetVertices{object, 1, {vertices[1]}});  // the copy had a gap, too
-  inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
-    add(SetVertices{object, first, std::move(run)});
-  });
   if (indexed_) {
     std::vector<std::int32_t> removed;
     inRuns(triangles_.read(), [&](std::int32_t first, std::vector<Triangle>&& run) {
@@ -175,6 +172,10 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
     });
     for (const std::int32_t triangle : removed) add(RemoveTriangle{object, triangle});
   }
+  if (sparse_) add(SetVertices{object, 1, {vertices[1]}});  // the copy had a gap, too
+  inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
+    add(SetVertices{object, first, std::move(run)});
+  });
   const std::int32_t past = hasDeformed_ ? 1 : edited && hasBeenPublished() ? 2 : 0;
   if (edited || hasDeformed_) add(ContinueMesh{object, past, edited ? lastEdit_ - firstEdit_ : -1});
 }

@@ -31,6 +31,7 @@ std::size_t ObjectTable::roomFor(Object& object, std::int64_t first, std::size_t
   }
   const auto start = static_cast<std::size_t>(first);
   std::size_t end = start + count;
+  if (count == 0) return 0;
   if (end > perObject) {
     end = perObject;
     call.refuse(name, "refused: beyond the limit of one object", " object ", object.id, ", ", what, " ",
@@ -60,6 +61,22 @@ std::size_t ObjectTable::roomFor(Object& object, std::int64_t first, std::size_t
     closeGap(object, count);
   }
   return end - start;
+}
+
+// Without numbered triangles each three vertices are one.
+std::size_t ObjectTable::roomForTriples(const Object& object, const SetVertices& c, std::string_view name,
+                                        const Call& call) const {
+  const std::size_t count = c.positions.size();
+  const std::int64_t most = config_.limits.verticesPerObject;
+  if (object.mesh.indexed() || c.first < 0 || c.first >= most) return count;
+  const std::uint64_t others = triangles_ - object.mesh.triangleCount();
+  const std::uint64_t inAll = config_.limits.trianglesInAll;
+  const std::uint64_t fit = 3 * (inAll > others ? inAll - others : 0) + 2;
+  const auto start = static_cast<std::uint64_t>(c.first);
+  if (start + count <= std::max<std::uint64_t>(fit, object.mesh.vertexCount())) return count;
+  call.refuse(name, "refused: the scene is full; clear or remove objects first", " object ", object.id,
+              ", vertex ", std::max(start, fit), ", limit ", inAll, " triangles in all objects");
+  return start < fit ? fit - start : 0;
 }
 
 void ObjectTable::closeGap(Object& object, std::size_t count) {
@@ -97,9 +114,9 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
   const std::size_t before = object->mesh.vertexCount();
   const std::size_t trianglesBefore = object->mesh.triangleCount();
   const std::size_t gap = object->gap;
-  const std::size_t room =
-      roomFor(*object, c.first, c.positions.size(), before, config_.limits.verticesPerObject,
-              config_.limits.verticesInAll, vertices_, kName, "vertex", call);
+  const std::size_t room = roomFor(*object, c.first, roomForTriples(*object, c, kName, call), before,
+                                   config_.limits.verticesPerObject, config_.limits.verticesInAll, vertices_,
+                                   kName, "vertex", call);
   if (room == 0) return;
   c.positions.resize(room);
   const std::size_t refused =

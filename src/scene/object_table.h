@@ -158,6 +158,8 @@ class ObjectTable {
   std::size_t roomFor(Object& object, std::int64_t first, std::size_t count, std::size_t present,
                       std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used, std::string_view name,
                       std::string_view what, const Call& call);
+  std::size_t roomForTriples(const Object& object, const SetVertices& c, std::string_view name,
+                             const Call& call) const;
   void setTriangles(Object& object, std::int64_t first, std::vector<Triangle> run, bool makesMetres,
                     const Call& call);
   void closeGap(Object& object, std::size_t count);

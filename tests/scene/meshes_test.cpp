@@ -222,7 +222,7 @@ TEST_F(Meshes, ARunIsAcceptedLikeItsMessagesOneByOne) {
   config.limits.verticesPerObject = 100;
   config.limits.verticesInAll = 150;
   config.limits.trianglesPerObject = 10;
-  config.limits.trianglesInAll = 45;
+  config.limits.trianglesInAll = 100;
   builder_ = SceneBuilder(config);
   say(SetObjectNumber{2});
   say(SetVertices{0, 90, std::vector<Vec3f>(11, Vec3f::Zero())});
@@ -236,6 +236,26 @@ TEST_F(Meshes, ARunIsAcceptedLikeItsMessagesOneByOne) {
   EXPECT_EQ(scene.objects[0].vertices->size(), 100U);
   EXPECT_EQ(scene.objects[0].triangles->size(), 10U);
   EXPECT_EQ(scene.objects[1].triangles->size(), 50U / 3);
+}
+
+// Three vertices are a triangle where none are numbered.
+TEST_F(Meshes, TriplesCountAmongTheTriangles) {
+  SceneConfig config = simulated({});
+  config.limits.trianglesInAll = 4;
+  builder_ = SceneBuilder(config);
+  say(SetObjectNumber{2});
+  say(SetVertices{0, 0, soup(3)});
+  EXPECT_TRUE(notices_.empty());
+  say(SetVertices{1, 0, soup(3)});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 1, vertex 5, limit 4 triangles in all objects"));
+  say(SetVertices{0, 0, soup(3, 1)});
+  EXPECT_TRUE(notices_.empty()) << "in place there is room";
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(builder_.describe().objects[0].triangles->size(), 3U);
+  EXPECT_EQ(builder_.describe().objects[1].triangles->size(), 1U);
+  say(SetTriangles{0, 0, {Triangle{0, 1, 2}}});
+  say(SetVertices{1, 5, soup(2)});
+  EXPECT_TRUE(notices_.empty()) << "numbered triangles take the place of the triples";
 }
 
 TEST_F(Meshes, ARefusedVertexAtTheEndOfARunIsNoVertex) {
