@@ -71,13 +71,16 @@ void MeshDraft::grow(std::vector<Vec3f>& vertices, std::size_t size) {
 }
 
 std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now) {
-  const std::size_t end = first + run.size();
   const std::size_t before = vertexCount();
-  const bool inPlace = end <= before;
-  if (inPlace && sameBytes(vertices_.read().data() + first, run)) return 0;
+  const auto isInPlace = [&] { return first + run.size() <= before; };
+  if (isInPlace() && sameBytes(vertices_.read().data() + first, run)) return 0;
   std::size_t refused = 0;
+  // A refused vertex at the end is none that has not come yet.
+  for (; !run.empty() && !isVertex(run.back()); ++refused) run.pop_back();
+  if (run.empty()) return refused;
   const bool usable = allUsable(run);
-  if (!usable && std::none_of(run.begin(), run.end(), isVertex)) return run.size();
+  const bool inPlace = isInPlace();
+  const std::size_t end = first + run.size();
   if (usable && first == 0 && end >= before) {
     vertices_.replace(std::move(run));
   } else if (usable) {
@@ -148,6 +151,7 @@ void inRuns(const std::vector<Item>& items, const Add& add) {
 
 }  // namespace
 
+// Triangles first: without them, vertices would count among the triangles, for which there may be no room.
 // Vertices that have not come are not numbers and stay so; triangles that were removed come with three equal
 // corners and are removed again.
 void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetres,
@@ -156,9 +160,6 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
   const Nanos at = edited ? lastEdit_ : 0;
   const auto add = [&](SceneCommand command) { out.push_back({client, std::move(command), at}); };
   const std::vector<Vec3f>& vertices = positionsAreUnderWay() ? current_->shapeVertices() : vertices_.read();
-  inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
-    add(SetVertices{object, first, std::move(run)});
-  });
   if (indexed_) {
     std::vector<std::int32_t> removed;
     inRuns(triangles_.read(), [&](std::int32_t first, std::vector<Triangle>&& run) {
@@ -171,6 +172,10 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
     });
     for (const std::int32_t triangle : removed) add(RemoveTriangle{object, triangle});
   }
+  if (sparse_) add(SetVertices{object, 1, {vertices[1]}});  // the copy had a gap, too
+  inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
+    add(SetVertices{object, first, std::move(run)});
+  });
   const std::int32_t past = hasDeformed_ ? 1 : edited && hasBeenPublished() ? 2 : 0;
   if (edited || hasDeformed_) add(ContinueMesh{object, past, edited ? lastEdit_ - firstEdit_ : -1});
 }

@@ -1,11 +1,14 @@
 // The commands on objects. Each checks all of its values before it changes anything.
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "scene/object_table.h"
 
 namespace hapticd::scene {
 namespace {
 
+constexpr std::string_view kSetTriangle = "setTriangle";
 constexpr std::string_view kBadMatrix =
     "refused: the matrix is not finite or too large, is singular, or its last row is not 0 0 0 1";
 
@@ -18,26 +21,31 @@ constexpr Nanos kLongestPause = 60'000'000'000;  // that a recording may state
 
 }  // namespace
 
-bool ObjectTable::hasRoom(Object& object, std::int32_t first, std::size_t count, std::size_t present,
-                          std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used,
-                          std::string_view name, std::string_view what, const Call& call) {
+// The rest is refused: what there is room for must not depend on which messages came together in one run.
+std::size_t ObjectTable::roomFor(Object& object, std::int64_t first, std::size_t count, std::size_t present,
+                                 std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used,
+                                 std::string_view name, std::string_view what, const Call& call) {
   if (first < 0) {
     call.refuse(name, "refused: numbers start at 0", " object ", object.id, ", ", what, " ", first);
-    return false;
+    return 0;
   }
-  const std::size_t end = static_cast<std::size_t>(first) + count;
+  const auto start = static_cast<std::size_t>(first);
+  std::size_t end = start + count;
+  if (count == 0) return 0;
   if (end > perObject) {
+    end = perObject;
     call.refuse(name, "refused: beyond the limit of one object", " object ", object.id, ", ", what, " ",
-                end - 1, ", limit ", perObject);
-    return false;
+                std::max(start, end), ", limit ", perObject);
+    if (start >= end) return 0;
   }
-  if (end > present && used + (end - present) > inAll) {
+  const std::size_t fits = present + (inAll > used ? inAll - used : 0);
+  if (end > present && end > fits) {
+    end = std::max(fits, present);
     call.refuse(name, "refused: the scene is full; clear or remove objects first", " object ", object.id,
-                ", ", what, " ", end - 1, ", limit ", inAll, " in all objects");
-    return false;
+                ", ", what, " ", std::max(start, end), ", limit ", inAll, " in all objects");
+    if (start >= end) return 0;
   }
   // Numbers far beyond the present ones would make a few bytes cost megabytes.
-  const std::size_t start = static_cast<std::size_t>(first);
   if (start > 2 * present + kGap) {
     const std::size_t gap = start - present;
     if (gaps_ + gap > kGapsInAll) {
@@ -45,14 +53,30 @@ bool ObjectTable::hasRoom(Object& object, std::int32_t first, std::size_t count,
                   "refused: too far beyond the numbers that were sent; send them in about ascending order",
                   " object ", object.id, ", ", what, " ", first, ", at most ",
                   std::max(2 * present + kGap, present + kGapsInAll - gaps_), " now");
-      return false;
+      return 0;
     }
     object.gap += gap;
     gaps_ += gap;
   } else if (end <= present) {
     closeGap(object, count);
   }
-  return true;
+  return end - start;
+}
+
+// Without numbered triangles each three vertices are one.
+std::size_t ObjectTable::roomForTriples(const Object& object, const SetVertices& c, std::string_view name,
+                                        const Call& call) const {
+  const std::size_t count = c.positions.size();
+  const std::int64_t most = config_.limits.verticesPerObject;
+  if (object.mesh.indexed() || c.first < 0 || c.first >= most) return count;
+  const std::uint64_t others = triangles_ - object.mesh.triangleCount();
+  const std::uint64_t inAll = config_.limits.trianglesInAll;
+  const std::uint64_t fit = 3 * (inAll > others ? inAll - others : 0) + 2;
+  const auto start = static_cast<std::uint64_t>(c.first);
+  if (start + count <= std::max<std::uint64_t>(fit, object.mesh.vertexCount())) return count;
+  call.refuse(name, "refused: the scene is full; clear or remove objects first", " object ", object.id,
+              ", vertex ", std::max(start, fit), ", limit ", inAll, " triangles in all objects");
+  return start < fit ? fit - start : 0;
 }
 
 void ObjectTable::closeGap(Object& object, std::size_t count) {
@@ -90,10 +114,11 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
   const std::size_t before = object->mesh.vertexCount();
   const std::size_t trianglesBefore = object->mesh.triangleCount();
   const std::size_t gap = object->gap;
-  if (!hasRoom(*object, c.first, c.positions.size(), before, config_.limits.verticesPerObject,
-               config_.limits.verticesInAll, vertices_, kName, "vertex", call)) {
-    return;
-  }
+  const std::size_t room = roomFor(*object, c.first, roomForTriples(*object, c, kName, call), before,
+                                   config_.limits.verticesPerObject, config_.limits.verticesInAll, vertices_,
+                                   kName, "vertex", call);
+  if (room == 0) return;
+  c.positions.resize(room);
   const std::size_t refused =
       object->mesh.setVertices(static_cast<std::uint32_t>(c.first), std::move(c.positions), call.now);
   if (refused > 0) {
@@ -106,30 +131,43 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
   meshEdited(*object, call);
 }
 
+// Those beside a refused one are accepted, as if they had come one by one.
 template <>
 void ObjectTable::handle(SetTriangles& c, const Call& call) {
-  constexpr std::string_view kName = "setTriangle";
-  Object* object = find(c.object, kName, call);
+  Object* object = find(c.object, kSetTriangle, call);
   if (object == nullptr || c.triangles.empty()) return;
-  const std::size_t before = object->mesh.triangleCount();
-  const auto outside = std::find_if(c.triangles.begin(), c.triangles.end(), [this](const Triangle& t) {
-    return *std::max_element(t.begin(), t.end()) >= config_.limits.verticesPerObject;
-  });
-  if (outside != c.triangles.end()) {
-    call.refuse(kName, "refused: no such vertex is possible", " object ", c.object, ", triangle ",
-                c.first + (outside - c.triangles.begin()), ", vertices ",
-                static_cast<std::int32_t>((*outside)[0]), " ", static_cast<std::int32_t>((*outside)[1]), " ",
-                static_cast<std::int32_t>((*outside)[2]));
-    return;
+  const auto isPossible = [this](const Triangle& t) {
+    return *std::max_element(t.begin(), t.end()) < config_.limits.verticesPerObject;
+  };
+  const auto begin = c.triangles.begin();
+  const auto end = c.triangles.end();
+  const auto refused = std::find_if_not(begin, end, isPossible);
+  if (refused == end || c.first < 0)
+    return setTriangles(*object, c.first, std::move(c.triangles), c.makesMetres, call);
+  const auto further = std::count_if(refused + 1, end, [&](const Triangle& t) { return !isPossible(t); });
+  const auto number = [&](auto triangle) { return std::int64_t{c.first} + (triangle - begin); };
+  call.refuse(kSetTriangle, "refused: no such vertex is possible", " object ", c.object, ", triangle ",
+              number(refused), ", vertices ", static_cast<std::int32_t>((*refused)[0]), " ",
+              static_cast<std::int32_t>((*refused)[1]), " ", static_cast<std::int32_t>((*refused)[2]),
+              further > 0 ? ", and " + std::to_string(further) + " after it" : "");
+  for (auto next = begin; next != end;) {
+    const auto stop = std::find_if_not(next, end, isPossible);
+    if (stop != next) setTriangles(*object, number(next), {next, stop}, c.makesMetres, call);
+    next = std::find_if(stop, end, isPossible);
   }
-  if (!hasRoom(*object, c.first, c.triangles.size(), before, config_.limits.trianglesPerObject,
-               config_.limits.trianglesInAll, triangles_, kName, "triangle", call)) {
-    return;
-  }
-  if (c.makesMetres) becomeStock(*object);
-  object->mesh.setTriangles(static_cast<std::uint32_t>(c.first), c.triangles, call.now);
-  triangles_ = triangles_ - before + object->mesh.triangleCount();
-  meshEdited(*object, call);
+}
+
+void ObjectTable::setTriangles(Object& object, std::int64_t first, std::vector<Triangle> run,
+                               bool makesMetres, const Call& call) {
+  const std::size_t before = object.mesh.triangleCount();
+  const std::size_t room = roomFor(object, first, run.size(), before, config_.limits.trianglesPerObject,
+                                   config_.limits.trianglesInAll, triangles_, kSetTriangle, "triangle", call);
+  if (room == 0) return;
+  run.resize(room);
+  if (makesMetres) becomeStock(object);
+  object.mesh.setTriangles(static_cast<std::uint32_t>(first), run, call.now);
+  triangles_ = triangles_ - before + object.mesh.triangleCount();
+  meshEdited(object, call);
 }
 
 template <>

@@ -147,14 +147,17 @@ bool ObjectTable::checkParent(std::int32_t id, std::int32_t parent, std::string_
   return true;
 }
 
-// First all objects below the scene, then the tree: each of its states is a part of the final one.
+// First all objects below the scene, then the tree: each of its states is a part of the final one. The
+// children of an object come in their order, in which they move.
 void ObjectTable::appendCommands(std::vector<ClientCommand>& out) const {
-  const auto add = [&](SceneCommand command, ClientId client = 0) {
-    out.push_back({client, std::move(command)});
-  };
+  const auto add = [&](SceneCommand command) { out.push_back({0, std::move(command)}); };
   add(SetObjectNumber{static_cast<std::int32_t>(objects_.size())});
   for (std::size_t id = 0; id < objects_.size(); ++id) {
     if (!objects_[id]) add(RemoveObject{static_cast<std::int32_t>(id)});
+  }
+  for (const auto& object : objects_) {
+    if (!object) continue;
+    for (const std::int32_t child : object->children) add(MoveToParent{child, object->id});
   }
   for (const auto& object : objects_) {
     if (!object) continue;
@@ -162,8 +165,6 @@ void ObjectTable::appendCommands(std::vector<ClientCommand>& out) const {
       add(AddObjectExScene{object->id});
     } else if (object->inMetres) {
       add(AddObject{object->id, object->parent});
-    } else if (object->parent != Object::kScene) {
-      add(MoveToParent{object->id, object->parent});
     }
     object->mesh.appendCommands(object->id, object->meshSetBy, object->inMetres, out);
     object->asked.appendTo(out);

@@ -154,9 +154,14 @@ class ObjectTable {
   template <class F>
   void withDescendants(Object& object, const F& f);
 
-  bool hasRoom(Object& object, std::int32_t first, std::size_t count, std::size_t present,
-               std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used, std::string_view name,
-               std::string_view what, const Call& call);
+  /// For how many of a run of vertices or triangles there is room; refuses the others.
+  std::size_t roomFor(Object& object, std::int64_t first, std::size_t count, std::size_t present,
+                      std::uint32_t perObject, std::uint64_t inAll, std::uint64_t used, std::string_view name,
+                      std::string_view what, const Call& call);
+  std::size_t roomForTriples(const Object& object, const SetVertices& c, std::string_view name,
+                             const Call& call) const;
+  void setTriangles(Object& object, std::int64_t first, std::vector<Triangle> run, bool makesMetres,
+                    const Call& call);
   void closeGap(Object& object, std::size_t count);
   void becomeStock(Object& object);
   void place(Object& object, const Affine& T_parent_object, const Call& call);

@@ -338,6 +338,62 @@ TEST(RecordingBegunLate, HasAFanThatHasDeformed) {
   endTheSame(r, file, 700);
 }
 
+// Such a mesh is built again where another one deforms.
+TEST(RecordingBegunLate, HasAMeshThatWasSentFromItsEnd) {
+  const RecordingFile file;
+  LateRecording r;
+  const auto floor = [&r](float height_m, std::int32_t first, std::size_t count) {
+    const std::vector<geometry::Vec3f> all{{-0.01F, height_m, -0.01F},
+                                           {-0.01F, height_m, 0.01F},
+                                           {0.01F, height_m, 0.01F},
+                                           {0.01F, height_m, -0.01F}};
+    r.send(
+        scene::SetVertices{1, first, {all.begin() + first, all.begin() + first + static_cast<int>(count)}});
+  };
+  r.glide({1, 40, 2}, 100);
+  r.send(scene::AddObject{1, -1});
+  floor(0.03F, 2, 2);
+  floor(0.03F, 0, 2);
+  r.send(scene::SetTriangles{1, 0, {{0, 1, 2}, {0, 2, 3}}, true});
+  r.send(scene::SetSurface{1, 0.8, 0.001, 0.4, 0.3});
+  r.glide({1, 40, 2}, 700);
+  r.record(file.path());
+  r.glide({1, 40, 2}, 50);
+  r.glide({1, 29, 2}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  floor(0.0305F, 0, 4);
+  r.glide({1, 29, 2}, 200);
+  endTheSame(r, file, 600);
+}
+
+// What turns together has one path, that of the first.
+TEST(RecordingBegunLate, TurnsTheChildrenOfAnObjectInTheirOrder) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide({1, 40, 2}, 100);
+  r.send(scene::ClearMesh{0});
+  r.send(scene::AddObject{1, -1});
+  for (const std::int32_t child : {3, 2}) {
+    const float x = child == 2 ? 0 : 0.05F;
+    r.send(scene::AddObject{child, 1});
+    r.send(scene::SetVertices{
+        child, 0, {{x - 0.02F, 0.02F, -0.02F}, {x, 0.02F, 0.04F}, {x + 0.02F, 0.02F, -0.02F}}});
+    r.send(scene::SetSurface{child, 0.8, 0.001, 0.4, 0.3});
+    r.send(scene::SetObjectPosition{child, {x, 0, 0}});
+  }
+  r.glide({1, 30, 2}, 700);
+  r.record(file.path());
+  r.glide({1, 30, 2}, 50);
+  r.glide({1, 19, 2}, 400);
+  EXPECT_EQ(r.last().rendering.touchedObject, 2);
+  for (int i = 1; i < 10; ++i) {
+    r.send(scene::SetObjectOrientation{1, {0, 0, 1}, 0.01 * i});
+    r.glide({1, 19, 2}, 20);
+  }
+  EXPECT_TRUE(r.last().rendering.touching);
+  endTheSame(r, file, 500);
+}
+
 // New positions alone are shown 4 ms after the last, and 20 ms after the first at the latest. What they
 // deform was there before.
 TEST(RecordingBegunLate, ShowsNewPositionsWhenTheyWereShown) {

@@ -198,6 +198,75 @@ TEST_F(Meshes, LimitsHoldForOneObjectAndForAll) {
   EXPECT_TRUE(notices_.empty());
 }
 
+// The decoder makes a run of what one read brings: what is accepted must not depend on that.
+TEST_F(Meshes, ARunIsAcceptedLikeItsMessagesOneByOne) {
+  say(SetVertices{0, 0, soup(3)});
+  say(SetTriangles{0, 0, {{0, 1, 2}, {3, 0xFFFFFFFF, 5}, {6, 7, 8}, {0, 1, 0x7FFFFFFF}}});
+  EXPECT_EQ(onlyNotice(Severity::error),
+            "setTriangle object 0, triangle 1, vertices 3 -1 5, and 1 after it: refused: no such vertex is "
+            "possible");
+  makeTouchable(1);
+  say(SetSurfaceProperty{0, "stiffness", 0.5});
+  publish();
+  ASSERT_EQ(triangles(), 3U);
+  EXPECT_EQ((*object(0)->mesh->triangles)[0], (Triangle{0, 1, 2}));
+  EXPECT_EQ((*object(0)->mesh->triangles)[2], (Triangle{6, 7, 8}));
+  say(SetTriangles{1, 0, {{0, 1, 0x7FFFFFFF}}, true});
+  notices_.clear();
+  say(SetTriangles{0, -2, {{0, 1, 2}, {0, 1, 0x7FFFFFFF}, {0, 1, 2}, {3, 4, 5}}});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("numbers start at 0"));
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(builder_.describe().objects[1].worldUnits, 1) << "a refused triangle does not declare metres";
+
+  SceneConfig config = simulated({});
+  config.limits.verticesPerObject = 100;
+  config.limits.verticesInAll = 150;
+  config.limits.trianglesPerObject = 10;
+  config.limits.trianglesInAll = 100;
+  builder_ = SceneBuilder(config);
+  say(SetObjectNumber{2});
+  say(SetVertices{0, 90, std::vector<Vec3f>(11, Vec3f::Zero())});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 0, vertex 100, limit 100"));
+  say(SetVertices{1, 0, std::vector<Vec3f>(60, Vec3f::Zero())});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 1, vertex 50, limit 150 in all objects"));
+  say(SetTriangles{0, 8, std::vector<Triangle>(3, Triangle{0, 1, 2})});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 0, triangle 10, limit 10"));
+  run(1'000 * kMillisecond);
+  const SceneDescription scene = builder_.describe();
+  EXPECT_EQ(scene.objects[0].vertices->size(), 100U);
+  EXPECT_EQ(scene.objects[0].triangles->size(), 10U);
+  EXPECT_EQ(scene.objects[1].triangles->size(), 50U / 3);
+}
+
+// Three vertices are a triangle where none are numbered.
+TEST_F(Meshes, TriplesCountAmongTheTriangles) {
+  SceneConfig config = simulated({});
+  config.limits.trianglesInAll = 4;
+  builder_ = SceneBuilder(config);
+  say(SetObjectNumber{2});
+  say(SetVertices{0, 0, soup(3)});
+  EXPECT_TRUE(notices_.empty());
+  say(SetVertices{1, 0, soup(3)});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 1, vertex 5, limit 4 triangles in all objects"));
+  say(SetVertices{0, 0, soup(3, 1)});
+  EXPECT_TRUE(notices_.empty()) << "in place there is room";
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(builder_.describe().objects[0].triangles->size(), 3U);
+  EXPECT_EQ(builder_.describe().objects[1].triangles->size(), 1U);
+  say(SetTriangles{0, 0, {Triangle{0, 1, 2}}});
+  say(SetVertices{1, 5, soup(2)});
+  EXPECT_TRUE(notices_.empty()) << "numbered triangles take the place of the triples";
+}
+
+TEST_F(Meshes, ARefusedVertexAtTheEndOfARunIsNoVertex) {
+  auto bad = soup(2);
+  bad.back().x() = std::numeric_limits<float>::quiet_NaN();
+  say(SetVertices{0, 0, bad});
+  EXPECT_THAT(onlyNotice(Severity::error), HasSubstr("object 0, 1 of the vertices from 0 on"));
+  run(1'000 * kMillisecond);
+  EXPECT_EQ(triangles(), 1U);
+}
+
 TEST_F(Meshes, VerticesFarBeyondTheOthersShareABoundedNumberOfGaps) {
   say(SetVertices{0, 65'536, soup(1)});
   EXPECT_TRUE(notices_.empty());

@@ -303,5 +303,91 @@ RC_GTEST_PROP(RandomCommands, TheCommandsOfASceneMakeItAgain, (std::uint64_t see
   checkSame(builder.describe(), again.describe());
 }
 
+void checkSameMesh(const MeshGeometry& a, const MeshGeometry& b, Nanos now) {
+  RC_ASSERT(a.index.size() == b.index.size());
+  RC_ASSERT(*a.triangles == *b.triangles);
+  RC_ASSERT(!a.fans == !b.fans);
+  for (std::uint32_t id = 0; id < a.triangles->size(); ++id) {
+    for (const Nanos time : {now, now + 3 * kMillisecond, now + 1000 * kMillisecond}) {
+      const Corners p = a.corners(id, time);
+      const Corners q = b.corners(id, time);
+      RC_ASSERT(p.a.hasNaN() == q.a.hasNaN());
+      if (p.a.hasNaN() || p.b.hasNaN() || p.c.hasNaN()) continue;
+      RC_ASSERT(p.a == q.a && p.b == q.b && p.c == q.c);
+    }
+  }
+}
+
+void checkSameSnapshot(const SceneSnapshot& a, const SceneSnapshot& b, Nanos now) {
+  RC_ASSERT(a.workspace.T_world_device.matrix() == b.workspace.T_world_device.matrix());
+  RC_ASSERT(a.faces == b.faces);
+  RC_ASSERT(a.objects.size() == b.objects.size());
+  for (std::size_t i = 0; i < a.objects.size(); ++i) {
+    const ObjectState& x = *a.objects[i];
+    const ObjectState& y = *b.objects[i];
+    RC_ASSERT(x.id == y.id);
+    RC_ASSERT(x.surface.stiffness_N_per_m == y.surface.stiffness_N_per_m);
+    RC_ASSERT(x.surface.damping_Ns_per_m == y.surface.damping_Ns_per_m);
+    RC_ASSERT(x.surface.staticFriction == y.surface.staticFriction);
+    RC_ASSERT(x.surface.dynamicFriction == y.surface.dynamicFriction);
+    checkSameMesh(*x.mesh, *y.mesh, now);
+    for (const Nanos time : {now, now + 7 * kMillisecond, now + 1000 * kMillisecond})
+      RC_ASSERT(x.motion.at(time).matrix() == y.motion.at(time).matrix());
+  }
+}
+
+// A recording that starts at any time shows what comes after its beginning as the server did.
+RC_GTEST_PROP(RandomCommands, ACopyOfASceneGoesOnAsTheScene, (std::uint64_t seed)) {
+  Speaker speaker(seed);
+  SceneConfig config;
+  config.stopwatch = [] { return Nanos{0}; };
+  config.limits.verticesPerObject = 100'000;
+  SceneBuilder builder(config);
+  std::vector<Notice> notices;
+  Nanos now = 1000 * kMillisecond;
+  builder.apply(0, SetObjectNumber{6}, now, notices);
+  for (std::int32_t id = 0; id < 6; ++id) {
+    builder.apply(0, SetSurfaceProperty{id, "stiffness", 0.5}, now, notices);
+    builder.apply(0, SetVertices{id, 0, oneTriangle()}, now, notices);
+  }
+  const auto wait = [&] { now += speaker.pick(3) == 0 ? speaker.pick(30) * kMillisecond : 0; };
+  for (int step = 0; step < 150; ++step) {
+    wait();
+    builder.apply(static_cast<ClientId>(speaker.pick(3)), speaker.next(), now, notices);
+    if (speaker.pick(60) == 0) builder.clientGone(static_cast<ClientId>(speaker.pick(3)), now);
+    if (speaker.pick(3) == 0) builder.publish(now, notices);
+  }
+  builder.publish(now, notices);
+
+  SceneBuilder copy(config);
+  for (ClientCommand& c : builder.commands(now)) copy.apply(c.client, std::move(c.command), c.at, notices);
+  copy.publish(now - 200 * kMillisecond, notices);
+  for (ClientCommand& c : builder.editsUnderWay(now))
+    copy.apply(c.client, std::move(c.command), c.at, notices);
+  std::shared_ptr<const SceneSnapshot> original;
+  std::shared_ptr<const SceneSnapshot> copied;
+  const auto publish = [&] {
+    if (auto next = builder.publish(now, notices)) original = std::move(next);
+    if (auto next = copy.publish(now, notices)) copied = std::move(next);
+  };
+  for (int i = 0; i < 100; ++i) {
+    now += 10 * kMillisecond;
+    publish();
+  }
+  for (SceneBuilder* one : {&builder, &copy}) one->apply(9, SetTouchableFaces{2}, now, notices);
+  publish();
+  checkSameSnapshot(*original, *copied, now);
+  for (int step = 0; step < 150; ++step) {
+    wait();
+    const auto client = static_cast<ClientId>(speaker.pick(3));
+    SceneCommand command = speaker.next();
+    copy.apply(client, SceneCommand(command), now, notices);
+    builder.apply(client, std::move(command), now, notices);
+    if (speaker.pick(3) != 0) continue;
+    publish();
+    checkSameSnapshot(*original, *copied, now);
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::scene
