@@ -709,6 +709,31 @@ TEST(RecordingBegunLateByAnOlderVersion, IsReadAndSaysWhatIsMissing) {
   EXPECT_LT(compared.same, compared.ticks) << "the vibration began anew";
 }
 
+// The index of the scene keeps room for ways that a copy does not know.
+TEST(RecordingBegunLate, DoesNotDependOnBoxesOfEarlierMovement) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide({1, 40, 2}, 100);
+  for (const std::int32_t far : {1, 2}) {
+    r.send(scene::AddObject{far, -1});
+    r.send(scene::SetVertices{far, 0, {{-0.01F, 0, -0.01F}, {0, 0, 0.01F}, {0.01F, 0, -0.01F}}});
+    r.send(scene::SetSurface{far, 0.8, 0.001, 0.4, 0.3});
+    r.send(scene::SetObjectPosition{far, {0.5 * far, 0.5, 0}});
+  }
+  r.glide({1, 40, 2}, 50);
+  for (int i = 0; i < 30; ++i) {
+    r.send(scene::SetObjectPosition{0, {0.06 - 0.001 * i, 0, 0}});
+    r.glide({1, 40, 2}, 10);
+  }
+  r.send(scene::SetPlane{0, {0, 1, 0, -0.0195}, 0.3, 0.001, 0.2, 0.1, 10});
+  r.glide({1, 30, 2}, 700);
+  r.record(file.path());
+  r.glide({1, 30, 2}, 50);
+  r.glide({1, 19, 2}, 400);
+  EXPECT_TRUE(r.last().rendering.touching);
+  endTheSame(r, file, 400);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, RecordingBegunLate, testing::ValuesIn(kGoesOn),
                          [](const auto& param) { return std::string(param.param.name); });
 INSTANTIATE_TEST_SUITE_P(All, RecordingOfAnUpload, testing::ValuesIn(kUploads),

@@ -57,7 +57,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, 
   before_ = before;
   sameWorkspace_ = before.scene != nullptr && before.scene->workspace.T_device_world.matrix() ==
                                                   now.scene->workspace.T_device_world.matrix();
-  objectCount_ = 0;
+  objectCount_ = skinCount_ = 0;
   freeTravel_ = std::numeric_limits<double>::infinity();
   minSkin_ = kRelativeSkin;
   radius_ = toolRadius_;
@@ -107,7 +107,8 @@ void ContactQuery::addObjectsByIndex(const scene::SceneSnapshot& scene, const Ve
   if (std::exchange(crowd_, 0) != 0) distances_.restart();
   // By id, so that the proxy does not depend on the order of visits.
   std::sort(found.begin(), found.begin() + count);
-  for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]]);
+  const Ball here{centre, reach};
+  for (std::size_t k = 0; k < count; ++k) add(*scene.objects[found[k]], &here);
 }
 
 // More boxes around the tool than fit: the nearest surfaces, and the tool moves only as far as all are known.
@@ -200,7 +201,9 @@ int ContactQuery::addObject(std::int32_t id) noexcept {
   return -1;
 }
 
-void ContactQuery::add(const ObjectState& state) noexcept {
+// Only the part of `here`, if it is given, counts for the smallest skin: the index keeps room for ways of
+// before, and a recording that begins later has another one.
+void ContactQuery::add(const ObjectState& state, const Ball* here) noexcept {
   for (int i = 0; i < objectCount_; ++i) {
     if (object(i).state == &state) return;
   }
@@ -219,8 +222,29 @@ void ContactQuery::add(const ObjectState& state) noexcept {
     if (placed.atRest) placed.restGeneration = generation_;
   }
   ++objectCount_;
-  minSkin_ = objectCount_ == 1 ? placed.skin : std::min(minSkin_, placed.skin);
   radius_ = std::max(radius_, placed.radius);
+  if (here != nullptr && !isNow(placed, *here) && !wasBefore(placed, *here)) return;
+  minSkin_ = skinCount_++ == 0 ? placed.skin : std::min(minSkin_, placed.skin);
+}
+
+namespace {
+
+bool reaches(const geometry::Box& box, const Vec3& p, double radius) {
+  return ((p - box.centre()).cwiseAbs() - 0.5 * box.extents()).cwiseMax(0.0).squaredNorm() <= radius * radius;
+}
+
+}  // namespace
+
+bool ContactQuery::isNow(const PlacedObject& placed, const Ball& ball) const noexcept {
+  return reaches(placed.state->mesh->boundsAfter(now_.time), placed.T_object_device * ball.centre,
+                 (ball.radius + placed.radius) * placed.stretch);
+}
+
+bool ContactQuery::wasBefore(const PlacedObject& placed, const Ball& ball) const noexcept {
+  if (placed.before == nullptr || placed.rests()) return false;
+  const Affine T_object_device = placed.T_device_objectBefore.inverse();
+  return reaches(placed.before->mesh->boundsAfter(before_.time), T_object_device * ball.centre,
+                 (ball.radius + placed.radius) * stretchOf(T_object_device.linear()));
 }
 
 bool ContactQuery::place(const ObjectState& state, PlacedObject& placed) const noexcept {

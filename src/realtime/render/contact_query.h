@@ -252,7 +252,9 @@ class ContactQuery {
   void addObjectsByIndex(const scene::SceneSnapshot& scene, const Vec3& centre, double reach,
                          const Vec3& tool) noexcept;
   void addNearestObjects(const scene::SceneSnapshot& scene, double reach, const Vec3& tool) noexcept;
-  void add(const scene::ObjectState& state) noexcept;
+  void add(const scene::ObjectState& state, const Ball* here = nullptr) noexcept;
+  bool isNow(const PlacedObject& placed, const Ball& ball) const noexcept;
+  bool wasBefore(const PlacedObject& placed, const Ball& ball) const noexcept;
   void findEnclosing(const Vec3& tool) noexcept;
   void dropStaleFacets() noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;
@@ -320,6 +322,7 @@ class ContactQuery {
   double freeTravel_ = 0;
   Vec3 freeFrom_ = Vec3::Zero();
   double minSkin_ = 0;
+  int skinCount_ = 0;  // objects that count for it
   FacetCache cache_;
   bool joinedFans_ = false;  // in the last gather()
   // The last balls whose triangles did not fit, and the steps of casts of this tick that shrank for that.

@@ -23,15 +23,19 @@ constexpr double kSameDirection = 1e-7;    // |n1 x n2|^2 of faces that are one 
 constexpr Nanos kLately = base::toNanos(kLongestTick_s);
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
-constexpr int kMaxVisits = 512;         // triangles in one search
+constexpr int kMaxVisits = 4096;  // triangles in one search
+constexpr int kWholeVisit = 8;    // of one that its height does not rule out
+constexpr double kGaugeRounding_m = 1e-12;
 constexpr std::size_t kFewObjects = 4;  // fewer than a query of the index would cost
 
 // The nearest surface of one stiffness.
 struct Neighbour {
   double stiffness = 0;
   double distance = 0;
-  double share = 1;            // less for a plane that ramps out
-  Vec3 offset = Vec3::Zero();  // of its point from the proxy
+  double share = 1;               // less for a plane that ramps out
+  Vec3 offset = Vec3::Zero();     // of its point from the proxy
+  std::int64_t triangle = kNone;  // that it is of, by object and number
+  static constexpr std::int64_t kNone = -1;
 };
 
 // Distance of points from the proxy: as usual above the tangent plane, longer below it. It is convex, its
@@ -47,6 +51,11 @@ struct Gauge {
     return std::sqrt(offset.squaredNorm() + kHiddenExcess * b * b);
   }
   double operator()(const Vec3& offset) const { return length(offset) - radius; }
+  // Of all points whose height above the proxy is at most this.
+  double leastBelow(double height) const {
+    const double b = std::min(0.0, height + radius);
+    return b < 0 ? std::sqrt(height * height + kHiddenExcess * b * b) - radius : 0;
+  }
   // Half the gradient of the squared length.
   Vec3 rise(const Vec3& offset) const { return offset + kHiddenExcess * below(offset) * up; }
 };
@@ -193,7 +202,7 @@ class NeighbourSearch {
       return nullptr;
     }
     ++count_;
-    *known = {stiffness, width_, 1, Vec3::Zero()};
+    *known = {stiffness, width_, 1, Vec3::Zero(), Neighbour::kNone};
     return known;
   }
   bool isTouched(double stiffness) const {
@@ -204,12 +213,12 @@ class NeighbourSearch {
   bool mayTakePart(const scene::ObjectState& state) const {
     return !isTouched(state.surface.stiffness_N_per_m) && !query_.isLeftOut(state.id);
   }
-  void consider(Neighbour& n, const Vec3& offset, double share = 1) const {
+  // Of two points at the same distance that of the lower number, for the order of visits is not defined.
+  void consider(Neighbour& n, const Vec3& offset, double share,
+                std::int64_t triangle = Neighbour::kNone) const {
     const double distance = std::max(0.0, gauge_(offset));
-    if (!(distance < n.distance)) return;
-    n.distance = distance;
-    n.offset = offset;
-    n.share = share;
+    if (!(distance < n.distance) && !(distance == n.distance && triangle < n.triangle)) return;
+    n = {n.stiffness, distance, share, offset, triangle};
   }
   // A face that is turned away counts below the tangent plane: it may begin at a ridge.
   bool facesProxy(const Facet& f) const {
@@ -242,8 +251,7 @@ void NeighbourSearch::addObjects() {
   std::array<std::uint32_t, kMaxNeighbours> found{};
   std::size_t count = 0;
   const Affine& T_world_device = scene.workspace.T_world_device;
-  const double reach =
-      (width_ + gauge_.radius) * kQueryMargin * std::sqrt(T_world_device.linear().squaredNorm());
+  const double reach = (width_ + gauge_.radius) * kQueryMargin * stretchOf(T_world_device.linear());
   scene.objectIndex->visitNear(T_world_device * proxy_, reach, [&](std::uint32_t i) noexcept {
     if (!mayTakePart(*scene.objects[i])) return;
     if (count == found.size()) {
@@ -267,20 +275,31 @@ void NeighbourSearch::addObject(const scene::ObjectState& state) {
   if (determinant == 0 || !std::isfinite(determinant)) return;
   placed.mirrored = determinant < 0;
   const Affine T_object_device = placed.T_device_object.inverse();
-  const double stretch = kQueryMargin * T_object_device.linear().norm();
+  const double stretch = kQueryMargin * stretchOf(T_object_device.linear());
+  const Vec3 proxy = T_object_device * proxy_;
   const auto reach = [&] { return (n->distance + gauge_.radius) * stretch; };
+  const Vec3 up = placed.T_device_object.linear().transpose() * gauge_.up;
+  const double base = gauge_.up.dot(placed.T_device_object.translation() - proxy_);
   const scene::SpatialIndex& index = state.mesh->indexAt(now_.time);
-  index.visitNearest(T_object_device * proxy_, reach(), [&](std::uint32_t triangle) noexcept {
-    if (visits_ == kMaxVisits) {
+  index.visitNearest(proxy, reach(), [&](std::uint32_t triangle) noexcept {
+    if (visits_ >= kMaxVisits) {
       complete_ = false;
       return -1.0;
     }
     ++visits_;
+    const scene::Corners k = state.mesh->corners(triangle, now_.time);
+    const double within = reach();
+    const Vec3 away =
+        (k.a.cwiseMin(k.b).cwiseMin(k.c) - proxy).cwiseMax(proxy - k.a.cwiseMax(k.b).cwiseMax(k.c));
+    if (away.cwiseMax(0.0).squaredNorm() > within * within) return within;
+    const double highest = base + std::max({up.dot(k.a), up.dot(k.b), up.dot(k.c)});
+    if (gauge_.leastBelow(highest) > n->distance + kGaugeRounding_m) return within;
+    visits_ += kWholeVisit - 1;
     Facet f;
     if (!makeFacet(placed.corners(triangle, now_.time), 0, f)) return reach();
     Vec3 offset;
     if (nearestInGauge(gauge_, {f.a - proxy_, f.b - proxy_, f.c - proxy_}, !facesProxy(f), offset)) {
-      consider(*n, offset);
+      consider(*n, offset, 1, (std::int64_t{state.id} << 32) + triangle);
     }
     return reach();
   });

@@ -430,6 +430,70 @@ TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
   EXPECT_LT(force[0].x(), -0.01);
 }
 
+// A mesh that moved has another tree than a copy that did not, with more room around its triangles.
+std::shared_ptr<scene::MeshGeometry> geometryWithRoom(const TriangleMesh& mesh, std::uint64_t topology,
+                                                      std::mt19937& random) {
+  auto geometry = geometryOf(mesh, topology);
+  std::uniform_real_distribution<double> room(0, 1e-3);
+  std::vector<Box> boxes;
+  for (const geometry::Triangle& t : mesh.triangles) {
+    Box box;
+    for (const std::uint32_t v : t) box.extend(Vec3(mesh.vertices[v].cast<double>()));
+    boxes.push_back({box.min - Vec3::Constant(room(random)), box.max + Vec3::Constant(room(random))});
+  }
+  geometry->index = scene::SpatialIndex::build(static_cast<std::uint32_t>(boxes.size()),
+                                               [&boxes](std::uint32_t id) { return boxes[id]; });
+  return geometry;
+}
+
+TEST_F(StiffnessTest, blend_does_not_depend_on_the_tree) {
+  constexpr int kCells = 60;
+  constexpr double kCell_m = 0.25e-3;
+  // A rough wall beside the plate, and a floor below it that the plate hides.
+  TriangleMesh mesh;
+  const auto addSheet = [&](const Vec3& corner, const Vec3& u, const Vec3& v, double rough_m) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (int i = 0; i <= kCells; ++i) {
+      for (int k = 0; k <= kCells; ++k) {
+        const Vec3 at = corner + kCell_m * (i * u + k * v) + uniform(-rough_m, rough_m) * u.cross(v);
+        mesh.vertices.push_back(at.cast<float>());
+        if (i == kCells || k == kCells) continue;
+        const std::uint32_t a = first + static_cast<std::uint32_t>(i * (kCells + 1) + k);
+        mesh.triangles.push_back({a, a + kCells + 1, a + kCells + 2});
+        mesh.triangles.push_back({a, a + kCells + 2, a + 1});
+      }
+    }
+  };
+  addSheet({0.002, -0.0075, -0.0075}, Vec3::UnitY(), Vec3::UnitZ(), 0.1e-3);
+  addSheet({-0.0075, -0.0075, -0.0006}, Vec3::UnitX(), Vec3::UnitY(), 0);
+  scene.faces = scene::TouchableFaces::both;
+  SceneFixture other;
+  other.faces = scene.faces;
+  addPlate({-0.02, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 900);
+  other.add(geometryOf({{{-0.02F, -0.05F, 0}, {-0.02F, 0.05F, 0}, {0.02F, 0.05F, 0}, {0.02F, -0.05F, 0}},
+                        {{0, 2, 1}, {0, 3, 2}}},
+                       1),
+            surface(900), scene::Motion::fixed(Affine::Identity()));
+  scene.add(geometryOf(mesh, 2), surface(300), scene::Motion::fixed(Affine::Identity()));
+  other.add(geometryWithRoom(mesh, 2, random), surface(300), scene::Motion::fixed(Affine::Identity()));
+  const auto one = scene.snapshot();
+  const auto two = other.snapshot();
+  Renderer first, second;
+  device::DeviceState hand;
+  Rendering a, b;
+  int blended = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const double t = i * 1e-3;
+    hand.position_m = {0.0012 * std::sin(7 * t), 0.004 * std::sin(5 * t), 0.0005 - std::min(t, 0.5) * 0.004};
+    first.step(*one, hand, i * kTick, kTick, a);
+    second.step(*two, hand, i * kTick, kTick, b);
+    ASSERT_EQ(a.force_N, b.force_N) << "tick " << i << ", status " << a.status << " " << b.status;
+    ASSERT_EQ(a.proxy_m, b.proxy_m) << "tick " << i;
+    blended += a.touching && std::abs(a.force_N.x()) > 1e-6 ? 1 : 0;
+  }
+  EXPECT_GT(blended, 500);
+}
+
 // With friction the slope of the stiffness is held by the proxy, and a cycle gives no energy either.
 TEST_F(StiffnessTest, friction_on_a_seam_gives_no_energy) {
   for (const double mu : {0.02, 0.1, 0.5}) {
