@@ -66,7 +66,7 @@ std::optional<Nanos> MeshDraft::due() const {
 }
 
 void MeshDraft::grow(std::vector<Vec3f>& vertices, std::size_t size) {
-  sparse_ = true;
+  missing_ += size - vertices.size();
   vertices.resize(size, Vec3f::Constant(kNotYet));
 }
 
@@ -79,14 +79,18 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
   for (; !run.empty() && !isVertex(run.back()); ++refused) run.pop_back();
   if (run.empty()) return refused;
   const bool usable = allUsable(run);
-  const bool inPlace = isInPlace();
+  // What fills a gap is a part of the shape.
+  const bool moves = isInPlace() && missing_ == 0;
   const std::size_t end = first + run.size();
+  const auto come = [this](const Vec3f& there) { missing_ -= missing_ > 0 && !isVertex(there) ? 1 : 0; };
   if (usable && first == 0 && end >= before) {
     vertices_.replace(std::move(run));
+    missing_ = 0;
   } else if (usable) {
     std::vector<Vec3f>& vertices = vertices_.write(end);
     if (first > before) grow(vertices, first);
     const std::size_t overlap = std::min<std::size_t>(run.size(), vertices.size() - first);
+    for (std::size_t i = 0; missing_ > 0 && i < overlap; ++i) come(vertices[first + i]);
     std::copy_n(run.begin(), overlap, vertices.begin() + first);
     vertices.insert(vertices.end(), run.begin() + static_cast<std::ptrdiff_t>(overlap), run.end());
   } else {
@@ -94,13 +98,14 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
     if (end > before) grow(vertices, end);
     for (std::size_t i = 0; i < run.size(); ++i) {
       if (isVertex(run[i])) {
+        come(vertices[first + i]);
         vertices[first + i] = run[i];
       } else {
         ++refused;
       }
     }
   }
-  if (inPlace && !sparse_) {
+  if (moves) {
     edited(now);
   } else {
     shapeEdited(now);
@@ -131,7 +136,7 @@ void MeshDraft::clear(Nanos now) {
   vertices_ = {};
   triangles_ = {};
   indexed_ = false;
-  sparse_ = false;
+  missing_ = 0;
   shapeEdited(now);
   finished_ = true;
 }
@@ -172,7 +177,6 @@ void MeshDraft::appendCommands(std::int32_t object, ClientId client, bool inMetr
     });
     for (const std::int32_t triangle : removed) add(RemoveTriangle{object, triangle});
   }
-  if (sparse_) add(SetVertices{object, 1, {vertices[1]}});  // the copy had a gap, too
   inRuns(vertices, [&](std::int32_t first, std::vector<Vec3f>&& run) {
     add(SetVertices{object, first, std::move(run)});
   });

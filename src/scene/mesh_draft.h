@@ -112,7 +112,7 @@ class MeshDraft {
   CopyOnWrite<Vec3f> vertices_;
   CopyOnWrite<Triangle> triangles_;  // as sent: corners may be missing
   bool indexed_ = false;
-  bool sparse_ = false;  // some vertex has not come yet
+  std::size_t missing_ = 0;  // vertices before the last one that have not come yet
   bool dirty_ = false;
   bool shapeChanged_ = false;  // more than positions
   bool finished_ = false;

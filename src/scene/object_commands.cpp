@@ -58,7 +58,7 @@ std::size_t ObjectTable::roomFor(Object& object, std::int64_t first, std::size_t
     object.gap += gap;
     gaps_ += gap;
   } else if (end <= present) {
-    closeGap(object, count);
+    closeGap(object, end - start);
   }
   return end - start;
 }

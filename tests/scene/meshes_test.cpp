@@ -315,6 +315,25 @@ TEST_F(Meshes, AreAcceptedFromTheirEnd) {
   EXPECT_TRUE(notices_.empty()) << "the gap of the first object was closed";
 }
 
+TEST_F(Meshes, SentFromTheirEndDeformOnceTheyAreComplete) {
+  const std::vector<Vec3f> all = soup(50);
+  for (const std::int32_t first : {100, 40, 0})
+    say(SetVertices{0, first, {all.begin() + first, all.begin() + std::min(first + 60, 150)}});
+  run(1'000 * kMillisecond);
+  const std::shared_ptr<const MeshGeometry> before = object(0)->mesh;
+  EXPECT_EQ(triangles(), 50U);
+  say(SetVertices{0, 0, soup(50, 1)});
+  run(MeshDraft::kPause);
+  EXPECT_EQ(object(0)->mesh->topology, before->topology);
+  EXPECT_TRUE(object(0)->mesh->target);
+  say(SetVertices{0, 153, soup(1)});
+  run(1'000 * kMillisecond);
+  EXPECT_NE(object(0)->mesh->topology, before->topology);
+  say(SetVertices{0, 0, soup(50)});
+  run(1'000 * kMillisecond);
+  EXPECT_FALSE(object(0)->mesh->target) << "of the triangle before the last one nothing has come";
+}
+
 TEST_F(Meshes, AreCheckedOnceTheyAreComplete) {
   SceneConfig config = simulated({});
   config.checkMeshes = true;
