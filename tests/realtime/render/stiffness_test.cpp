@@ -430,6 +430,33 @@ TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
   EXPECT_LT(force[0].x(), -0.01);
 }
 
+// What lies below the touched face counts as if it were six times as far away, and with the potential
+// 1/2 kappa d^2 the force grows as kappa does with the width.
+TEST_F(StiffnessTest, hidden_surface_counts_by_six_times_its_depth) {
+  constexpr double kTouched = 900;
+  constexpr double kHidden = 300;
+  constexpr double kBelow_m = 0.2e-3;
+  addPlate({-0.02, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), kTouched);
+  addPlate({-0.02, 0, -kBelow_m}, Vec3::UnitX(), Vec3::UnitZ(), kHidden);
+  const auto potential = [&](double depth_m) {
+    const double t = std::min(1.0, 6 * kBelow_m / std::hypot(1e-3, 1.75 * depth_m));
+    const double s = 0.5 * (1 - t * t * (3 - 2 * t));
+    return 0.5 * (kTouched + (kHidden - kTouched) * s) * depth_m * depth_m;
+  };
+  const auto snapshot = scene.snapshot();
+  Renderer renderer;
+  device::DeviceState hand;
+  Rendering out;
+  Nanos now = 0;
+  for (double depth_m = -0.0005; depth_m < 0.002; depth_m += 0.01e-3) {
+    hand.position_m = {0, 0.001, -depth_m};
+    renderer.step(*snapshot, hand, now += kTick, kTick, out);
+    if (depth_m < 0.1e-3) continue;
+    const double force_N = (potential(depth_m + 1e-7) - potential(depth_m - 1e-7)) / 2e-7;
+    ASSERT_NEAR(out.force_N.z(), force_N, 2e-3 * force_N) << depth_m;
+  }
+}
+
 // A mesh that moved has another tree than a copy that did not, with more room around its triangles.
 std::shared_ptr<scene::MeshGeometry> geometryWithRoom(const TriangleMesh& mesh, std::uint64_t topology,
                                                       std::mt19937& random) {
