@@ -338,7 +338,7 @@ TEST(RecordingBegunLate, HasAFanThatHasDeformed) {
   endTheSame(r, file, 700);
 }
 
-// Such a mesh is built again where another one deforms.
+// It deforms in the copy, too, once nothing of it is missing.
 TEST(RecordingBegunLate, HasAMeshThatWasSentFromItsEnd) {
   const RecordingFile file;
   LateRecording r;

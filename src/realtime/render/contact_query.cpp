@@ -30,6 +30,10 @@ scene::Corners mapped(const Affine& t, const scene::Corners& c, bool mirrored) {
   return out;
 }
 
+bool reaches(const geometry::Box& box, const Vec3& p, double radius) {
+  return ((p - box.centre()).cwiseAbs() - 0.5 * box.extents()).cwiseMax(0.0).squaredNorm() <= radius * radius;
+}
+
 }  // namespace
 
 scene::Corners PlacedObject::corners(std::uint32_t triangle, Nanos now) const noexcept {
@@ -223,24 +227,16 @@ void ContactQuery::add(const ObjectState& state, const Ball* here) noexcept {
   }
   ++objectCount_;
   radius_ = std::max(radius_, placed.radius);
-  if (here != nullptr && !isNow(placed, *here) && !wasBefore(placed, *here)) return;
+  if (here != nullptr && !isNear(placed, *here) && !wasNear(placed, *here)) return;
   minSkin_ = skinCount_++ == 0 ? placed.skin : std::min(minSkin_, placed.skin);
 }
 
-namespace {
-
-bool reaches(const geometry::Box& box, const Vec3& p, double radius) {
-  return ((p - box.centre()).cwiseAbs() - 0.5 * box.extents()).cwiseMax(0.0).squaredNorm() <= radius * radius;
-}
-
-}  // namespace
-
-bool ContactQuery::isNow(const PlacedObject& placed, const Ball& ball) const noexcept {
+bool ContactQuery::isNear(const PlacedObject& placed, const Ball& ball) const noexcept {
   return reaches(placed.state->mesh->boundsAfter(now_.time), placed.T_object_device * ball.centre,
                  (ball.radius + placed.radius) * placed.stretch);
 }
 
-bool ContactQuery::wasBefore(const PlacedObject& placed, const Ball& ball) const noexcept {
+bool ContactQuery::wasNear(const PlacedObject& placed, const Ball& ball) const noexcept {
   if (placed.before == nullptr || placed.rests()) return false;
   const Affine T_object_device = placed.T_device_objectBefore.inverse();
   return reaches(placed.before->mesh->boundsAfter(before_.time), T_object_device * ball.centre,

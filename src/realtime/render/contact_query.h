@@ -253,8 +253,8 @@ class ContactQuery {
                          const Vec3& tool) noexcept;
   void addNearestObjects(const scene::SceneSnapshot& scene, double reach, const Vec3& tool) noexcept;
   void add(const scene::ObjectState& state, const Ball* here = nullptr) noexcept;
-  bool isNow(const PlacedObject& placed, const Ball& ball) const noexcept;
-  bool wasBefore(const PlacedObject& placed, const Ball& ball) const noexcept;
+  bool isNear(const PlacedObject& placed, const Ball& ball) const noexcept;
+  bool wasNear(const PlacedObject& placed, const Ball& ball) const noexcept;
   void findEnclosing(const Vec3& tool) noexcept;
   void dropStaleFacets() noexcept;
   bool place(const scene::ObjectState& state, PlacedObject& placed) const noexcept;

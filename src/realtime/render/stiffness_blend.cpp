@@ -24,7 +24,7 @@ constexpr Nanos kLately = base::toNanos(kLongestTick_s);
 constexpr int kMaxStiffnesses = 16;
 constexpr int kMaxNeighbours = 64;
 constexpr int kMaxVisits = 4096;  // triangles in one search
-constexpr int kWholeVisit = 8;    // of one that its height does not rule out
+constexpr int kWholeVisit = 8;    // of one that neither its box nor its height rules out
 constexpr double kGaugeRounding_m = 1e-12;
 constexpr std::size_t kFewObjects = 4;  // fewer than a query of the index would cost
 
