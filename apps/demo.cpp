@@ -124,9 +124,16 @@ void addDemo(CLI::App& app) {
   auto options = std::make_shared<DemoOptions>();
   CLI::App* command = app.add_subcommand(
       "demo", "Start a server with a simulated hand that explores a scan; prints the address of its page");
+  CLI::Option* listen = command
+                            ->add_option("--listen", options->listen,
+                                         "ADDR:PORT for TCP and UDP [127.0.0.1:3883, or a free port]")
+                            ->check(notEmpty());
   command
-      ->add_option("--listen", options->listen, "ADDR:PORT for TCP and UDP [127.0.0.1:3883, or a free port]")
-      ->check(notEmpty());
+      ->add_option_function<int>(
+          "--port", [options](int port) { options->listen = "127.0.0.1:" + std::to_string(port); },
+          "Only the port; 0: any free one")
+      ->check(withinIntegers(0, 65535))
+      ->excludes(listen);
   command
       ->add_option("--http", options->http,
                    "ADDR:PORT of the page, or 'off' [127.0.0.1:8080, or a free port]")

@@ -74,7 +74,12 @@ bool explainUnknownCommand(const CLI::App& app) {
 std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
   const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
-  if (code == CLI::ExitCodes::ExtrasError) return "unexpected argument '" + app.remaining(true).front() + "'";
+  if (code == CLI::ExitCodes::ExtrasError) {
+    const std::string extra = app.remaining(true).front();
+    const bool isConfig = typedCommand(app).first->get_option_no_throw("--config") != nullptr &&
+                          (extra.ends_with(".cfg") || extra.ends_with(".toml"));
+    return "unexpected argument '" + extra + "'" + (isConfig ? "; use '--config " + extra + "'" : "");
+  }
   if (code != CLI::ExitCodes::ArgumentMismatch) return text;
   const std::string option = text.substr(0, text.find(':'));
   return option + (text.ends_with("missing") ? " needs a value" : " is given more than once");

@@ -199,7 +199,7 @@ class SceneBuilder::State {
   }
   bool use(const FittedWorkspace& fitted, std::string_view name, const Call& call) {
     if (!fitted.T_world_device) {
-      call.refuse(name, "refused, the old map stays: " + fitted.refusal);
+      call.refuse(name, "refused, the old map stays: " + fitted.refusal, fitted.values);
       return false;
     }
     if (!fitted.warning.empty()) call.warn(name, fitted.warning);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
+#include <utility>
 
 namespace hapticd::scene {
 
@@ -34,6 +36,24 @@ std::optional<Affine> affineFrom(const Mat4& m) {
   t.matrix() = m.topRows<3>() / w;
   if (!isInvertible(t)) return std::nullopt;
   return t;
+}
+
+std::string flawOf(const Mat4& m) {
+  std::ostringstream flaw;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      if (isUsable(m(row, column))) continue;
+      flaw << "row " << row + 1 << ", column " << column + 1 << " is " << m(row, column);
+      return std::move(flaw).str();
+    }
+  }
+  const double w = m(3, 3);
+  if (w == 0 || m.row(3).head<3>().cwiseAbs().maxCoeff() > 1e-9 * std::abs(w)) {
+    flaw << "last row " << m.row(3);
+  } else {
+    flaw << "determinant " << m.topLeftCorner<3, 3>().determinant();
+  }
+  return std::move(flaw).str();
 }
 
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include "geometry/types.h"
 
@@ -39,6 +40,9 @@ bool isInvertible(const Affine& t);
 
 /// The affine map a 4x4 matrix stands for; nothing when it is projective, singular or not finite.
 std::optional<Affine> affineFrom(const Mat4& m);
+/// The values that make a matrix unusable, for a text to its sender: a number, its last row or its
+/// determinant.
+std::string flawOf(const Mat4& m);
 
 /// Rotation about an axis of any length; nothing when there is no axis although there is an angle.
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad);

@@ -26,6 +26,17 @@ bool allUsable(const std::vector<Vec3f>& run) {
   return usable;
 }
 
+RefusedVertices unusableOf(const std::vector<Vec3f>& run) {
+  RefusedVertices refused;
+  if (allUsable(run)) return refused;
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    if (isVertex(run[i])) continue;
+    if (refused.count == 0) refused = {0, i, run[i]};
+    ++refused.count;
+  }
+  return refused;
+}
+
 bool sameBytes(const Vec3f* a, const std::vector<Vec3f>& b) {
   return std::memcmp(a, b.data(), b.size() * sizeof(Vec3f)) == 0;
 }
@@ -70,15 +81,16 @@ void MeshDraft::grow(std::vector<Vec3f>& vertices, std::size_t size) {
   vertices.resize(size, Vec3f::Constant(kNotYet));
 }
 
-std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now) {
+RefusedVertices MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now) {
   const std::size_t before = vertexCount();
   const auto isInPlace = [&] { return first + run.size() <= before; };
-  if (isInPlace() && sameBytes(vertices_.read().data() + first, run)) return 0;
-  std::size_t refused = 0;
+  if (isInPlace() && sameBytes(vertices_.read().data() + first, run)) return {};
+  const RefusedVertices refused = unusableOf(run);
   // A refused vertex at the end is none that has not come yet.
-  for (; !run.empty() && !isVertex(run.back()); ++refused) run.pop_back();
+  const std::size_t sent = run.size();
+  while (!run.empty() && !isVertex(run.back())) run.pop_back();
   if (run.empty()) return refused;
-  const bool usable = allUsable(run);
+  const bool usable = refused.count == sent - run.size();
   // What fills a gap is a part of the shape.
   const bool moves = isInPlace() && missing_ == 0;
   const std::size_t end = first + run.size();
@@ -100,8 +112,6 @@ std::size_t MeshDraft::setVertices(std::uint32_t first, std::vector<Vec3f>&& run
       if (isVertex(run[i])) {
         come(vertices[first + i]);
         vertices[first + i] = run[i];
-      } else {
-        ++refused;
       }
     }
   }

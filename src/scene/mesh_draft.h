@@ -43,6 +43,12 @@ class CopyOnWrite {
   std::shared_ptr<const std::vector<T>> shared_;
 };
 
+struct RefusedVertices {
+  std::size_t count = 0;
+  std::size_t number = 0;  ///< of the first, in the run
+  Vec3f position;
+};
+
 /// Vertices and triangles by number. Runs arrive in any order. A vertex that was never set is NaN, and a
 /// triangle with such a corner exerts no force.
 class MeshDraft {
@@ -64,8 +70,8 @@ class MeshDraft {
   const std::vector<Triangle>& triangles() const { return triangles_.read(); }
 
   /// Writes a run; values that are not finite or beyond kLargestCoordinate leave their vertex as it
-  /// was. Returns how many those were.
-  std::size_t setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now);
+  /// was. Returns how many those were, and the first of them.
+  RefusedVertices setVertices(std::uint32_t first, std::vector<Vec3f>&& run, Nanos now);
   void setTriangles(std::uint32_t first, const std::vector<Triangle>& run, Nanos now);
   /// False when there is no such triangle.
   bool removeTriangle(std::uint32_t triangle, Nanos now);

@@ -119,11 +119,13 @@ void ObjectTable::handle(SetVertices& c, const Call& call) {
                                    kName, "vertex", call);
   if (room == 0) return;
   c.positions.resize(room);
-  const std::size_t refused =
+  const RefusedVertices refused =
       object->mesh.setVertices(static_cast<std::uint32_t>(c.first), std::move(c.positions), call.now);
-  if (refused > 0) {
+  if (refused.count > 0) {
     call.refuse(kName, "refused: a coordinate is not finite or too large; the vertex stays as it was",
-                " object ", c.object, ", ", refused, " of the vertices from ", c.first, " on");
+                " object ", c.object, ", vertex ", c.first + refused.number, " at ",
+                refused.position.transpose(),
+                refused.count > 1 ? " and " + std::to_string(refused.count - 1) + " more" : "");
   }
   if (object->mesh.vertexCount() == before && object->gap > gap) closeGap(*object, object->gap - gap);
   vertices_ += object->mesh.vertexCount() - before;
@@ -231,7 +233,7 @@ void ObjectTable::handle(TransformMesh& c, const Call& call) {
   if (object == nullptr) return;
   const std::optional<Affine> t = affineFrom(fromRows(c.matrix));
   if (!t) {
-    call.refuse(kName, kBadMatrix, " object ", c.object);
+    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flawOf(fromRows(c.matrix)));
     return;
   }
   becomeStock(*object);
@@ -305,7 +307,7 @@ void ObjectTable::handle(SetTransform& c, const Call& call) {
   if (object == nullptr) return;
   const std::optional<Affine> t = affineFrom(fromColumns(c.matrix));
   if (!t) {
-    call.refuse(kName, kBadMatrix, " object ", c.object);
+    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flawOf(fromColumns(c.matrix)));
     return;
   }
   object->asked.keep(c, call.client);

@@ -1,6 +1,7 @@
 #include "scene/surface_settings.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "scene/matrices.h"
 
@@ -88,10 +89,12 @@ bool SurfaceSettings::set(const SetSurfaceProperty& command, const SceneConfig& 
     call.warn(kName, "out of range, clamped", " object ", command.object, ", ", command.name, " ",
               command.value, " becomes ", value);
   }
-  if (row->member == &Surface::staticFriction) staticGiven_ = true;
   const double before = asked_.*row->member;
   asked_.*row->member = value * (atOne(config).*row->member);
-  return asked_.*row->member != before;
+  const bool firstStatic = row->member == &Surface::staticFriction && !std::exchange(staticGiven_, true);
+  // The first static friction may lower the dynamic one, which the client is told, also where it is the 0 of
+  // before.
+  return asked_.*row->member != before || firstStatic;
 }
 
 bool SurfaceSettings::set(const SetSurface& command, const SceneConfig& config, const Call& call) {

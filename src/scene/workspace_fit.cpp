@@ -2,6 +2,8 @@
 
 #include <Eigen/SVD>
 #include <cmath>
+#include <sstream>
+#include <utility>
 
 #include "scene/matrices.h"
 
@@ -25,14 +27,27 @@ Mat3 nearestSimilarity(const Mat3& m) {
 // Clients keep their matrices in floats: what those lose is not worth a word.
 constexpr double kSimilarityTolerance = 1e-5;
 
+template <class... Parts>
+std::string textOf(const Parts&... parts) {
+  std::ostringstream text;
+  static_cast<void>((text << ... << parts));
+  return std::move(text).str();
+}
+
+FittedWorkspace refused(const char* why, std::string values) {
+  FittedWorkspace result;
+  result.refusal = why;
+  result.values = std::move(values);
+  return result;
+}
+
 FittedWorkspace fitView(const Affine& T_view_world, const Box& view, const Box& device_m, WorkspaceFit fit) {
   FittedWorkspace result;
   const Vec3 ratio = view.extents().cwiseQuotient(device_m.extents());
   const double scale =
       fit == WorkspaceFit::published ? (std::max(ratio.x(), ratio.y()) + ratio.z()) / 2 : ratio.maxCoeff();
   if (!(scale > 1e-12 && scale < 1e12)) {
-    result.refusal = "the view has no extent";
-    return result;
+    return refused("the view has no extent", textOf(" extent ", view.extents().transpose()));
   }
   Affine T_view_device = Affine(Eigen::UniformScaling<double>(scale));
   T_view_device.translation() = view.centre() - scale * device_m.centre();
@@ -47,15 +62,13 @@ FittedWorkspace fitView(const Affine& T_view_world, const Box& view, const Box& 
     T_view_similar.linear() = similar;
   }
   if (!isInvertible(T_view_similar)) {
-    result.refusal = "the model matrix is singular";
-    return result;
+    return refused("the model matrix is singular",
+                   textOf(" determinant ", T_view_similar.linear().determinant()));
   }
   const Affine T_world_device = T_view_similar.inverse() * T_view_device;
-  if (isInvertible(T_world_device)) {
-    result.T_world_device = T_world_device;
-  } else {
-    result.refusal = "the map would not be a number";
-  }
+  if (!isInvertible(T_world_device))
+    return refused("the map would not be a number", textOf(" scale ", scale));
+  result.T_world_device = T_world_device;
   return result;
 }
 
@@ -64,23 +77,23 @@ Vec3 corner(int i, const Vec3& min, const Vec3& max) {
           (i & 4) != 0 ? max.z() : min.z()};
 }
 
-constexpr const char* kBadModel = "the model matrix is not finite, singular, or not affine";
+FittedWorkspace badModel(const Mat4& model) {
+  return refused("the model matrix is not finite, singular, or not affine",
+                 " model matrix: " + flawOf(model));
+}
 
 }  // namespace
 
 FittedWorkspace fitProjection(const std::array<double, 16>& model, const std::array<double, 16>& projection,
                               const Box& device_m, WorkspaceFit fit) {
-  FittedWorkspace refused;
   const std::optional<Affine> T_view_world = affineFrom(fromColumns(model));
-  if (!T_view_world) {
-    refused.refusal = kBadModel;
-    return refused;
-  }
+  if (!T_view_world) return badModel(fromColumns(model));
   const Mat4 T_clip_view = fromColumns(projection);
   const Eigen::FullPivLU<Mat4> lu(T_clip_view);
   if (!T_clip_view.allFinite() || !lu.isInvertible()) {
-    refused.refusal = "the projection matrix is not finite or singular";
-    return refused;
+    return refused("the projection matrix is not finite or singular",
+                   T_clip_view.allFinite() ? textOf(" determinant ", T_clip_view.determinant())
+                                           : " projection matrix: " + flawOf(T_clip_view));
   }
   const Mat4 T_view_clip = lu.inverse();
   Box view;
@@ -88,8 +101,8 @@ FittedWorkspace fitProjection(const std::array<double, 16>& model, const std::ar
     const Vec3 clip = corner(i, Vec3::Constant(-1), Vec3::Constant(1));
     const Eigen::Vector4d p = T_view_clip * clip.homogeneous();
     if (!(std::abs(p.w()) >= 1e-12) || !p.allFinite()) {
-      refused.refusal = "the projection matrix puts a corner of the view at infinity";
-      return refused;
+      return refused("the projection matrix puts a corner of the view at infinity",
+                     textOf(" corner ", clip.transpose()));
     }
     view.extend(Vec3(p.hnormalized()));
   }
@@ -98,17 +111,12 @@ FittedWorkspace fitProjection(const std::array<double, 16>& model, const std::ar
 
 FittedWorkspace fitBox(const std::array<double, 16>& model, const std::array<double, 6>& box,
                        const Box& device_m, WorkspaceFit fit) {
-  FittedWorkspace refused;
   const std::optional<Affine> T_view_world = affineFrom(fromColumns(model));
-  if (!T_view_world) {
-    refused.refusal = kBadModel;
-    return refused;
-  }
+  if (!T_view_world) return badModel(fromColumns(model));
   const Vec3 min(box[0], box[1], box[2]);
   const Vec3 max(box[3], box[4], box[5]);
   if (!min.allFinite() || !max.allFinite()) {
-    refused.refusal = "the box is not finite";
-    return refused;
+    return refused("the box is not finite", textOf(" from ", min.transpose(), " to ", max.transpose()));
   }
   Box view;
   for (int i = 0; i < 8; ++i) view.extend(Vec3(*T_view_world * corner(i, min, max)));

@@ -14,6 +14,7 @@ namespace hapticd::scene {
 struct FittedWorkspace {
   std::optional<Affine> T_world_device;
   std::string refusal;  ///< why there is none
+  std::string values;   ///< of the client, that are the reason
   std::string warning;  ///< what was done differently
 };
 

@@ -42,7 +42,7 @@ grep -qa '"triangles":3674' <&3
 kill -TERM "$(pgrep -P "$demo" hapticd || echo "$demo")"
 wait "$demo"
 
-without_rights demo --listen 127.0.0.1:0 --http off --seconds 1 >"$work/demo"
+without_rights demo --port 0 --http off --seconds 1 >"$work/demo"
 ! grep -n browser "$work/demo" || exit 1
 grep -q '^  watch: ' "$work/demo"
 

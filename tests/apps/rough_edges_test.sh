@@ -25,6 +25,7 @@ refused 2 "hapticd touch: mesh is required; 'hapticd touch --help'" "$hapticd" t
 refused 2 "hapticd: unknown command ''; 'hapticd --help'" "$hapticd" ''
 refused 2 "hapticd: A subcommand is required; 'hapticd --help'" "$hapticd"
 refused 2 "hapticd serve: unexpected argument 'first'; 'hapticd serve --help'" "$hapticd" serve first second
+refused 2 "hapticd serve: unexpected argument 'my.cfg'; use '--config my.cfg'; 'hapticd serve --help'" "$hapticd" serve my.cfg
 refused 2 "hapticd watch: unexpected argument 'third'; 'hapticd watch --help'" "$hapticd" watch Phantom@localhost third fourth
 refused 2 "hapticd serve: --port needs a value; 'hapticd serve --help'" "$hapticd" serve --port
 refused 2 "hapticd serve: --port is given more than once; 'hapticd serve --help'" "$hapticd" serve --port 1 --port 2

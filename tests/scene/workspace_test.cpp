@@ -224,6 +224,14 @@ TEST_F(Surfaces, DynamicFrictionIsAtMostTheStaticOneWhateverComesFirst) {
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("dynamic friction 0.3 is above static friction 0.2"));
 }
 
+TEST_F(Surfaces, AStaticFrictionOfZeroTellsThatItLowersTheDynamicOne) {
+  set("dynamic friction", 0.3);
+  set("static friction", 0);
+  publish();
+  EXPECT_DOUBLE_EQ(surface().dynamicFriction, 0);
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("dynamic friction 0.3 is above static friction 0"));
+}
+
 TEST_F(Surfaces, StockUnitsAreTheSameOnEveryDeviceAndAreClamped) {
   say(SetSurface{0, 2, 0.001, 0.5, 0.4});
   EXPECT_EQ(

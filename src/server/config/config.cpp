@@ -49,7 +49,7 @@ class Reader {
     std::int64_t value = out;
     takeExact<std::int64_t>(key, value, "a whole number");
     if (value < std::numeric_limits<int>::min() || value > std::numeric_limits<int>::max()) {
-      fail(*find(key), key, "a smaller number");
+      fail(*find(key), key, "a whole number from -2147483648 to 2147483647");
     }
     out = static_cast<int>(value);
   }
