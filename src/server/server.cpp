@@ -536,6 +536,9 @@ void Server::onPeerGone(Session& session, const std::string& reason) {
 
 void Server::onHeartbeatAgain(Session& session) {
   for (const auto& scene : scenes_) scene->restoreForces(session.id());
+  deliver(*scenes_.front(),
+          {{session.id(), scene::Notice::Severity::warning,
+            "Heartbeat: none came through for 5 s, and your forces ramped out; they act again"}});
 }
 
 Station* Server::stationOf(wire::LocalSender name) noexcept {

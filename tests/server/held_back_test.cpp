@@ -428,6 +428,8 @@ TEST_F(HeldBackTest, AClientWithoutAHeartbeatInALongPauseFeelsNothingUntilTheNex
     client->send(kUp);
     return force_N > 0.95;
   })) << lines_.text();
+  EXPECT_TRUE(
+      client->untilText("Heartbeat: none came through for 5 s, and your forces ramped out; they act again"));
 }
 
 TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
