@@ -71,7 +71,8 @@ struct DiscTree::Query {
   float perLength2;
   std::span<std::uint32_t> found;
   std::size_t count;
-  int groups;
+  int left;  // groups that may still be tested
+  void giveUp() { count = found.size() + 1; }
 };
 
 struct DiscTree::FloatBox {
@@ -180,7 +181,7 @@ unsigned DiscTree::near(const Query& query, const BoxGroup& group) noexcept {
 }
 
 void DiscTree::descend(Query& query, std::size_t level, std::size_t group) const noexcept {
-  ++query.groups;
+  if (--query.left < 0) return query.giveUp();
   const Level& boxes = levels_[level];
   unsigned mask = near(query, boxes.groups[group]) & validOf(boxes.count, group);
   for (; mask != 0; mask &= mask - 1) {
@@ -188,29 +189,29 @@ void DiscTree::descend(Query& query, std::size_t level, std::size_t group) const
     if (level > 0) {
       descend(query, level - 1, child);
     } else {
-      ++query.groups;
+      if (--query.left < 0) return query.giveUp();
       unsigned discs = near(query, discs_[child]) & validOf(triangles_.size(), child);
       for (; discs != 0 && query.count < query.found.size(); discs &= discs - 1) {
         query.found[query.count++] =
             static_cast<std::uint32_t>(kGroup * child + static_cast<std::size_t>(std::countr_zero(discs)));
       }
-      if (discs != 0) query.count = query.found.size() + 1;
+      if (discs != 0) query.giveUp();
     }
     if (query.count > query.found.size()) return;
   }
 }
 
-std::size_t DiscTree::findNear(const Vec3& from, const Vec3& way, double distance,
+std::size_t DiscTree::findNear(const Vec3& from, const Vec3& way, double distance, int most,
                                std::span<std::uint32_t> found, int& groups) const noexcept {
   if (levels_.empty()) return 0;
-  Query query{{from.cast<float>(), way.cast<float>(), 0, 0, 0}, 0, found, 0, 0};
+  Query query{{from.cast<float>(), way.cast<float>(), 0, 0, 0}, 0, found, 0, most};
   query.path.length2 = query.path.way.squaredNorm();
   query.perLength2 = query.path.length2 > 0 ? 1 / query.path.length2 : 0;
   query.path.distance = (1 + kRounding) * static_cast<float>(distance + rounding_) +
                         kRounding * (query.path.from.cwiseAbs() + query.path.way.cwiseAbs()).maxCoeff();
   query.path.distance2 = query.path.distance * query.path.distance;
   descend(query, levels_.size() - 1, 0);
-  groups += query.groups;
+  groups += most - std::max(query.left, 0);
   return query.count;
 }
 

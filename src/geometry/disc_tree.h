@@ -63,10 +63,11 @@ class DiscTree {
            const std::vector<bool>& leftOut);
 
   /// Writes the places of at least all triangles within `distance` of the segment from `from` to from + way
-  /// and returns how many these are; more than there is room for when they do not fit. Adds the number of
-  /// groups that it tested to `groups`. The order depends on the mesh alone.
-  std::size_t findNear(const Vec3& from, const Vec3& way, double distance, std::span<std::uint32_t> found,
-                       int& groups) const noexcept;
+  /// and returns how many these are; more than there is room for when they do not fit, or when more than
+  /// `most` groups would have to be tested. Adds the number of groups that it tested to `groups`. The order
+  /// depends on the mesh alone.
+  std::size_t findNear(const Vec3& from, const Vec3& way, double distance, int most,
+                       std::span<std::uint32_t> found, int& groups) const noexcept;
   std::uint32_t triangleAt(std::uint32_t place) const noexcept { return triangles_[place]; }
   Disc discAt(std::uint32_t place) const noexcept {
     const DiscGroup& group = discs_[place / kGroup];

@@ -61,7 +61,7 @@ TEST(DiscTree, finds_all_that_is_near_a_way) {
         const Vec3 way = query % 3 == 0 ? Vec3(Vec3::Zero()) : Vec3(scale * 0.3 * any());
         const double distance = scale * std::pow(10.0, place(random) - 1);
         int groups = 0;
-        const std::size_t count = tree.findNear(from, way, distance, places, groups);
+        const std::size_t count = tree.findNear(from, way, distance, 1 << 20, places, groups);
         ASSERT_LE(count, places.size());
         std::set<std::uint32_t> found;
         for (std::size_t i = 0; i < count; ++i) found.insert(tree.triangleAt(places[i]));
@@ -92,7 +92,7 @@ TEST(DiscTree, finds_what_is_just_as_far) {
       const double h = height(random);
       const Vec3 above = (corner(0) + corner(1) + corner(2)) / 3 + h * normal;
       int groups = 0;
-      const std::size_t count = tree.findNear(above, Vec3::Zero(), h, places, groups);
+      const std::size_t count = tree.findNear(above, Vec3::Zero(), h, 1 << 20, places, groups);
       ASSERT_LE(count, places.size());
       const auto end = places.begin() + static_cast<std::ptrdiff_t>(count);
       EXPECT_TRUE(
@@ -121,7 +121,7 @@ TEST(DiscTree, finds_little_more_along_a_plane) {
   std::vector<std::uint32_t> places(8192);
   int groups = 0;
   // Radius 5, 50 um around a way of 1 mm: 2.9 mm2 of the plane, 580 triangles.
-  EXPECT_LT(tree.findNear({10, 10, 5}, {1, 0, 0}, 5.05, places, groups), 800U);
+  EXPECT_LT(tree.findNear({10, 10, 5}, {1, 0, 0}, 5.05, 1 << 20, places, groups), 800U);
   EXPECT_LT(groups, 400);
 }
 
@@ -135,14 +135,24 @@ TEST(DiscTree, leaves_out_what_is_no_triangle_and_tells_what_does_not_fit) {
   const DiscTree tree(mesh.vertices, mesh.triangles, leftOut);
   int groups = 0;
   std::vector<std::uint32_t> places(97);
-  ASSERT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, places, groups), 97U);
+  ASSERT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, 1 << 20, places, groups), 97U);
   for (const std::uint32_t place : places) {
     const std::uint32_t triangle = tree.triangleAt(place);
     EXPECT_TRUE(triangle != 1 && triangle != 2 && triangle != 7) << triangle;
   }
   places.resize(96);
-  EXPECT_GT(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, places, groups), places.size());
-  EXPECT_EQ(DiscTree(mesh.vertices, {}, {}).findNear(Vec3::Zero(), Vec3::Zero(), 1, places, groups), 0U);
+  EXPECT_GT(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, 1 << 20, places, groups), places.size());
+  places.resize(97);
+  for (const int most : {1, 2, 14}) {  // 13 groups of discs and three of boxes
+    groups = 0;
+    EXPECT_GT(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, most, places, groups), places.size()) << most;
+    EXPECT_EQ(groups, most);
+  }
+  groups = 0;
+  EXPECT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 100, 16, places, groups), 97U);
+  EXPECT_EQ(groups, 16);
+  EXPECT_EQ(DiscTree(mesh.vertices, {}, {}).findNear(Vec3::Zero(), Vec3::Zero(), 1, 1 << 20, places, groups),
+            0U);
 }
 
 // Of one triangle, of copies of it, of one without an extent, and of the smallest numbers.
@@ -156,8 +166,8 @@ TEST(DiscTree, has_room_for_meshes_without_an_extent) {
       const DiscTree tree(corners, triangles, {});
       int groups = 0;
       std::vector<std::uint32_t> places(100);
-      EXPECT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 1, places, groups), copies + 1);
-      EXPECT_EQ(tree.findNear(Vec3(0, 0, 9), Vec3::Zero(), 1, places, groups), 0U);
+      EXPECT_EQ(tree.findNear(Vec3::Zero(), Vec3::Zero(), 1, 1 << 20, places, groups), copies + 1);
+      EXPECT_EQ(tree.findNear(Vec3(0, 0, 9), Vec3::Zero(), 1, 1 << 20, places, groups), 0U);
     }
   }
 }

@@ -214,7 +214,8 @@ class ContactQuery {
   static constexpr int kBallVisit = 6;   // one that a ball gathers by the index
   static constexpr int kDiscVisit = 2;   // one that it gathers by its disc; a disc that is made
   static constexpr int kFacetVisit = 4;  // a facet that a ball makes
-  static constexpr int kBoxVisit = 4;    // one that its box or its distance rules out; eight tested in a tree
+  static constexpr int kBoxVisit = 4;    // one that its box or its distance rules out
+  static constexpr int kGroupVisit = 8;  // eight discs or boxes that are tested in a tree
   static constexpr int kScansOfOne = 6;  // discs that a cast looks at, for a sixteenth
   static constexpr int kMaxUnfit = 8;
   static constexpr double kReserveShare = 0.2;  // of the tool radius, that is gathered in reserve at most
@@ -279,6 +280,8 @@ class ContactQuery {
   Ball ballAround(const FacetCache::TriangleId& id) const noexcept;
   void gatherNear(const Vec3& from, const Vec3& way, double radius, bool& overflowed) noexcept;
   void gatherByIndex(int object, const Vec3& from, const Vec3& way, double reach) noexcept;
+  std::size_t findDiscs(const geometry::DiscTree& discs, const Vec3& from, const Vec3& way,
+                        double distance) noexcept;
   bool gatherByDiscs(int object, const Vec3& from, const Vec3& way, double reach) noexcept;
   bool ensureWayGathered(const Vec3& from, const Vec3& way, double margin) noexcept;
   static bool isUneven(const PlacedObject& placed) noexcept;

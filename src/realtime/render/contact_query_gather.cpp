@@ -205,7 +205,7 @@ void ContactQuery::learnWhatFits(const Vec3& centre, double radius, bool overflo
   if (overflowed || (!cache_.complete() && 2 * cache_.size() > FacetCache::kMaxTriangles)) {
     fits_m_ = std::max(0.5 * radius, kSmallestGather_m);
     if (canGatherFansAlongWays()) fits_m_ = kSmallestGather_m;
-    while (fits_m_ > kSmallestGather_m && !discsFit(centre, fits_m_))
+    while (fits_m_ > kSmallestGather_m && !workSpent() && !discsFit(centre, fits_m_))
       fits_m_ = std::max(0.5 * fits_m_, kSmallestGather_m);
     reserve_m_ = std::min(reserve_m_, fits_m_);
     countBefore_ = FacetCache::kMaxTriangles;  // tells nothing of how few a smaller one leaves out
@@ -228,10 +228,8 @@ bool ContactQuery::discsFit(const Vec3& centre, double radius) noexcept {
   for (int i = 0; i < objectCount_; ++i) {
     const PlacedObject& placed = object(i);
     if (!hasDiscs(placed) || isPassable(i)) continue;
-    int groups = 0;
-    all += placed.state->mesh->discs->findNear(placed.T_object_device * centre, Vec3::Zero(),
-                                               (radius + placed.radius) * placed.stretch, places_, groups);
-    work_ += kBoxVisit * groups;
+    all += findDiscs(*placed.state->mesh->discs, placed.T_object_device * centre, Vec3::Zero(),
+                     (radius + placed.radius) * placed.stretch);
   }
   return all <= places_.size();
 }
@@ -321,6 +319,16 @@ void ContactQuery::gatherByIndex(int i, const Vec3& from, const Vec3& way, doubl
   joinedFans_ = joinedFans_ || (fans && fans->any());
 }
 
+// Into places_. What would spend the work of the tick does not fit.
+std::size_t ContactQuery::findDiscs(const geometry::DiscTree& discs, const Vec3& from, const Vec3& way,
+                                    double distance) noexcept {
+  const int most = std::max(kVisit * (kMaxVisits - facetCasts_) - work_, 0) / kGroupVisit + 1;
+  int groups = 0;
+  const std::size_t count = discs.findNear(from, way, distance, most, places_, groups);
+  work_ += kGroupVisit * groups;
+  return count;
+}
+
 // False when they do not fit.
 bool ContactQuery::gatherByDiscs(int i, const Vec3& from, const Vec3& way, double reach) noexcept {
   const PlacedObject& placed = object(i);
@@ -332,9 +340,7 @@ bool ContactQuery::gatherByDiscs(int i, const Vec3& from, const Vec3& way, doubl
   if (mesh.fans) fans.emplace(placed, now_.time, start, start + along, reach, toolRadius_);
   const geometry::Mat3 turn = placed.T_object_device.linear().transpose();
   const double rounding = placed.metresPerUnit * discs.rounding();
-  int groups = 0;
-  const std::size_t count = discs.findNear(start, along, reach * kWiden * placed.stretch, places_, groups);
-  work_ += kBoxVisit * groups;
+  const std::size_t count = findDiscs(discs, start, along, reach * kWiden * placed.stretch);
   if (count > places_.size()) {
     cache_.invalidate();
     return false;

@@ -159,6 +159,22 @@ TEST(WorkOfABall, follows_its_way_along_needles) {
   }
 }
 
+// A bowl a hair larger, of more triangles than a tick can look at: it is not felt, and no tick looks at all
+// of it.
+TEST(WorkOfABall, ends_in_a_bowl_that_is_too_fine) {
+  constexpr double kRadius_m = 0.010;
+  SceneFixture scene;
+  scene.add(bowl(kRadius_m + 0.0001, 500, 200), surface(1000));
+  Ball ball(scene, kRadius_m);
+  int spent = 0;
+  for (int i = 0; i < reduced(300, 150); ++i) {
+    ball.at({1e-4 * std::sin(0.02 * i), 1e-4 * std::cos(0.02 * i), std::max(-0.0015, 0.012 - 2e-4 * i)});
+    ASSERT_LT(ball.visits(), kMaxVisits + 1024) << i;
+    spent += (ball.status() & kRenderWorkLimit) != 0 ? 1 : 0;
+  }
+  EXPECT_GT(spent, 50);
+}
+
 // All of a bowl that deforms around a ball may push it, which takes exact tests of all its triangles.
 TEST(WorkOfABall, ends_where_faces_that_deform_push_it) {
   constexpr double kRadius_m = 0.005;
