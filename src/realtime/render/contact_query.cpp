@@ -152,6 +152,8 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
   };
   const auto end = objects_.begin() + objectCount_;
   leftOutChanged_ = false;
+  enclosureVisits_ = 0;
+  if (enclosingCount_ == 0) enclosureRests_ = 0;
   if (enclosingCount_ == 0 && std::none_of(objects_.begin(), end, appeared)) return;
   const auto known = enclosing_;
   const auto knownEnd = known.begin() + enclosingCount_;
@@ -163,6 +165,9 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
     if (!here && now_.scene->find(*id) != nullptr)
       enclosing_[static_cast<std::size_t>(enclosingCount_++)] = *id;
   }
+  constexpr int kRests = 15;  // ticks after one whose budget did not suffice: the next one would hardly do
+  const bool rests = enclosureRests_ > 0;
+  enclosureRests_ -= rests ? 1 : 0;
   EnclosureBudget budget;
   const double ballRadius = keepsFacets_ ? 0 : radius_;
   int kept = 0;
@@ -170,7 +175,7 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
     const std::int32_t id = placed->state->id;
     const bool around =
         std::find(known.begin(), knownEnd, id) != knownEnd
-            ? !hasLeft(*placed, faces(), now_.time, tool, ballRadius, budget)
+            ? rests || !hasLeft(*placed, faces(), now_.time, tool, ballRadius, budget)
             : appeared(*placed) && encloses(*placed, faces(), now_.time, tool, ballRadius, budget);
     if (around && enclosingCount_ < kMaxObjects) {
       enclosing_[static_cast<std::size_t>(enclosingCount_++)] = id;
@@ -181,6 +186,8 @@ void ContactQuery::findEnclosing(const Vec3& tool) noexcept {
     if (&target != &*placed) target = *placed;
   }
   objectCount_ = kept;
+  enclosureVisits_ = EnclosureBudget{}.visits - budget.visits;
+  if (budget.visits <= 0) enclosureRests_ = kRests;
   leftOutChanged_ =
       !std::equal(known.begin(), knownEnd, enclosing_.begin(), enclosing_.begin() + enclosingCount_);
 }

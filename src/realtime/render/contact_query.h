@@ -99,6 +99,7 @@ class ContactQuery {
     ++generation_;
     allAppeared_ = true;
     enclosingCount_ = 0;
+    enclosureRests_ = 0;
     crowd_ = 0;
     distances_.restart();
   }
@@ -141,6 +142,8 @@ class ContactQuery {
   bool limitsTravel() const noexcept { return std::isfinite(freeTravel_); }
   /// True when an object is left out because it appeared around the tool.
   bool isEnclosed() const noexcept { return enclosingCount_ > 0; }
+  /// How many triangles this tick looked at to find those out.
+  int enclosureVisits() const noexcept { return enclosureVisits_; }
 
   /// Gathers the facets that a tool inside a ball can touch, so that casts inside it need no index. False
   /// when they exceed the storage; casts then use the index.
@@ -318,6 +321,8 @@ class ContactQuery {
   std::array<std::int32_t, kMaxObjects> enclosing_{};
   int enclosingCount_ = 0;
   bool leftOutChanged_ = false;
+  int enclosureVisits_ = 0;  // in this tick
+  int enclosureRests_ = 0;   // ticks until it is tested again whether the tool has left them
   bool allAppeared_ = true;  // in this tick
   std::size_t crowd_ = 0;    // number of objects in a scene with more boxes around the tool than fit, or 0
   ObjectDistances distances_;

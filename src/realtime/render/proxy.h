@@ -91,10 +91,12 @@ class Proxy {
   bool commandChanged() const noexcept { return commandChanged_; }
   PlacedPlanes& planes() noexcept { return planes_; }
   void forget() noexcept { query_.forget(); }
-  /// What the last tick did: casts, how often they tried one facet, and triangles that it examined in all.
+  /// What the last tick did: casts, how often they tried one facet, and triangles that it examined in all and
+  /// to find out what is around the tool.
   int casts() const noexcept { return casts_; }
   int facetCasts() const noexcept { return query_.facetCasts(); }
   int visits() const noexcept { return query_.visits(); }
+  int enclosureVisits() const noexcept { return query_.enclosureVisits(); }
 
  private:
   struct ActiveSet {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <random>
 #include <vector>
 
 #include "meshes.h"
@@ -27,6 +28,7 @@ class Ball {
     return felt.count == 0 ? 0 : 1000 * (felt.normal_m + felt.lateral_m).norm() * proxy_->feltShare();
   }
   int visits() const { return proxy_->visits(); }
+  int enclosureVisits() const { return proxy_->enclosureVisits(); }
   std::uint32_t status() const { return status_; }
   const Vec3& place() const { return proxy_->position(); }
 
@@ -173,6 +175,37 @@ TEST(WorkOfABall, ends_in_a_bowl_that_is_too_fine) {
     spent += (ball.status() & kRenderWorkLimit) != 0 ? 1 : 0;
   }
   EXPECT_GT(spent, 50);
+}
+
+// What appears around the hand and has too many triangles to tell when the hand has left it takes the time of
+// few ticks only, and is felt soon after.
+TEST(WorkOfABall, is_little_within_what_appeared_and_has_too_many_triangles) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-0.02F, 0.02F);
+  TriangleMesh soup;
+  for (std::uint32_t i = 0; i < 20'000; ++i) {
+    for (int k = 0; k < 3; ++k) soup.vertices.emplace_back(place(random), place(random), place(random));
+    soup.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  SceneFixture scene;
+  scene.add(soup, surface(1000));
+  for (const double radius_m : {0.0, 0.001}) {
+    Ball ball(scene, radius_m);
+    int busy = 0;
+    constexpr int kTicks = 320;
+    for (int i = 0; i < kTicks; ++i) {
+      EXPECT_EQ(ball.at({0, 0, 1e-5 * i}), 0);
+      ASSERT_NE(ball.status() & kRenderEnclosed, 0U) << i;
+      busy += ball.enclosureVisits() > 0 ? 1 : 0;
+    }
+    EXPECT_LE(busy, kTicks / 16) << radius_m;
+    int left = 0;
+    for (; (ball.status() & kRenderEnclosed) != 0 && left < 100; ++left) ball.at({0, 0, 0.03});
+    EXPECT_LE(left, 17) << radius_m;
+    double felt = 0;
+    for (int i = 0; i < 100; ++i) felt = ball.at({0, 0, 0.03 - 2e-4 * i});
+    EXPECT_GT(felt, 1) << radius_m;
+  }
 }
 
 // All of a bowl that deforms around a ball may push it, which takes exact tests of all its triangles.
