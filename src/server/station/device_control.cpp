@@ -77,11 +77,11 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
   }
   const auto gone = [this](const Stop& stop) { return isGone(stop); };
   const std::vector<Stop> before = stops_;
+  const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
   if (sender.isOperator || (sender.isPage && sender.mayCommand && !sender.hasOperators &&
                             std::all_of(stops_.begin(), stops_.end(), gone))) {
     stops_.clear();
   }
-  const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
   if (!stops_.empty()) {
     const Stop& other = stops_.back();
     refusal = {RefusalCode::stoppedByOther, "Rearm_Forces refused: " + other.description +

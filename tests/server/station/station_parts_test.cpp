@@ -253,6 +253,12 @@ TEST_F(RearmTest, APageDoesOnceTheClientIsGoneAndThereIsNoOperator) {
   EXPECT_FALSE(rearms(page)) << "an operator can do it";
   page.hasOperators = false;
   EXPECT_TRUE(rearms(page));
+  stop(client(3));
+  stop(page);
+  EXPECT_FALSE(rearms(page)) << "it undoes its own";
+  stop(page);
+  control_.clientGone(3);
+  EXPECT_TRUE(rearms(page)) << "its own, and that of the program that is gone";
 }
 
 TEST_F(RearmTest, TheConnectionsOfOneProgramAreOne) {
