@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/reports/client_tick.h"
+#include "server/session/identity.h"
 
 namespace hapticd::server {
 namespace {
@@ -66,7 +67,8 @@ void DeviceControl::stopForces(const Order& order, const Sender& sender) {
 
 bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal) {
   // One connection keeps its order by itself.
-  const bool otherConnection = order.address == stop_.address && order.client != stop_.client;
+  const bool otherConnection =
+      sourceOf(order.address) == sourceOf(stop_.address) && order.client != stop_.client;
   const bool sentEarlier =
       otherConnection && order.sent < stop_.sent && stop_.sent - order.sent <= kLongestTravel;
   const Refusal later{RefusalCode::none, "Rearm_Forces ignored: the forces were stopped after it was sent"};
