@@ -130,8 +130,10 @@ void Server::openSocket() {
         },
         connectionOptions(config_.limits));
   } catch (const net::Error& error) {
-    if (configured) throw;
-    spdlog::warn("no Unix socket: {}; choose another path by socket in the configuration", error.what());
+    const std::string text =
+        std::string(error.what()) + "; choose another path by socket in the configuration";
+    if (configured) throw net::Error(text);
+    spdlog::warn("no Unix socket: {}", text);
   }
 }
 
