@@ -457,6 +457,7 @@ std::map<scene::ClientId, std::size_t> Server::waitingCommands() const {
 }
 
 void Server::onEnding(Session& session) {
+  for (const auto& station : stations_) station->clientEnds(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
 }
 
