@@ -137,8 +137,13 @@ void SystemFiles::remove(const std::filesystem::path& path) {
   std::filesystem::remove(path);
 }
 
+// Unlike create_directories(), for nobody else to write into, whatever the umask.
 void SystemFiles::createFolder(const std::filesystem::path& path) {
-  std::filesystem::create_directories(path);
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none)) return;
+  if (path.has_relative_path() && path.has_parent_path()) createFolder(path.parent_path());
+  if (::mkdir(path.c_str(), 0755) == 0 || std::filesystem::is_directory(path, none)) return;
+  fail(errno == EEXIST ? ENOTDIR : errno, "cannot create", path);
 }
 
 std::vector<std::string> SystemFiles::list(const std::filesystem::path& folder) {

@@ -1,5 +1,6 @@
 #include "net/asio_listener.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "net/acceptor.h"
@@ -45,6 +46,7 @@ class AsioListener final : public Acceptor {
   void listenLocally(const std::filesystem::path& path) {
     const int fd = listenAt(path);
     address_ = path.string();
+    ::lstat(address_.c_str(), &file_);
     local_ = {kLoopbackAddress, 0};
     isLocal_ = true;
     error_code error;
@@ -100,9 +102,14 @@ class AsioListener final : public Acceptor {
   bool connectionWaits() noexcept override { return isReadable(acceptor_.native_handle()); }
 
   void closeSocket() noexcept override {
+    // Somebody may have removed it, and another server may have its own there.
+    struct stat present {};
+    if (isLocal_ && ::lstat(address_.c_str(), &present) == 0 && present.st_dev == file_.st_dev &&
+        present.st_ino == file_.st_ino) {
+      ::unlink(address_.c_str());
+    }
     error_code ignored;
     acceptor_.close(ignored);
-    if (isLocal_) ::unlink(address_.c_str());
   }
 
   std::string address() const override { return address_; }
@@ -114,6 +121,7 @@ class AsioListener final : public Acceptor {
   Endpoint local_;
   std::string address_;
   bool isLocal_ = false;  // a Unix socket
+  struct stat file_ {};   // of its path
 };
 
 }  // namespace

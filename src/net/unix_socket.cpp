@@ -93,8 +93,7 @@ int listenAt(const fs::path& path) {
     if (errno != EADDRINUSE) fail(path, errno);
     struct stat there {};
     if (::lstat(path.c_str(), &there) == 0 && !S_ISSOCK(there.st_mode))
-      throw Error(path.string() +
-                  " exists and is no socket: choose another path by socket in the configuration");
+      throw Error(path.string() + " exists and is no socket");
     if (!isAbandoned(path)) fail(path, EADDRINUSE);
     ::unlink(path.c_str());
     if (!bind()) fail(path, errno);

@@ -130,8 +130,10 @@ void Server::openSocket() {
         },
         connectionOptions(config_.limits));
   } catch (const net::Error& error) {
-    if (configured) throw;
-    spdlog::warn("no Unix socket: {}; choose another path by socket in the configuration", error.what());
+    const std::string text =
+        std::string(error.what()) + "; choose another path by socket in the configuration";
+    if (configured) throw net::Error(text);
+    spdlog::warn("no Unix socket: {}", text);
   }
 }
 
@@ -332,25 +334,28 @@ void Server::sendPresentStates() {
 void Server::onWebClient(net::Connection connection, std::string_view token, bool ofPage) {
   Session& session = addSession(std::move(connection), nullptr, SessionMode::web);
   if (ofPage) session.setOfPage();
-  if (!token.empty()) identify(session, token, wire::LocalSender{0});
+  session.setToken(token);
 }
 
-std::optional<Commander> Server::admitHaply(const net::Endpoint& remote, std::string& refusal) {
+std::optional<HaplyOwner::Refused> Server::refuseHaply(const net::Endpoint& remote) {
   const std::string address = remote.addressText();
-  const std::string source = sourceOf(address);
+  std::optional<Refused> refused;
   if (!isNear(remote.address) && !config_.insecure) {
-    refusal = "this port is not encrypted, and " + address + " is not in trusted_networks";
-  } else if (!admission_.hasRoom(source)) {
-    refusal = "the server is full";
-  } else {
-    admission_.enter(source);
-    const scene::ClientId id = nextClient_++;
-    throttledLog_.log(spdlog::level::info, address,
-                      fmt::format("client {} connected from {}, haply", id, address));
-    return Commander{id, address, credentials_.identityOf(remote.address, std::nullopt)};
+    refused = {403, "this port is not encrypted, and " + address + " is not in trusted_networks"};
+  } else if (!admission_.hasRoom(sourceOf(address))) {
+    refused = {503, "the server is full"};
   }
-  throttledLog_.warn("haply connection from " + address + " refused: " + refusal);
-  return std::nullopt;
+  if (refused) throttledLog_.warn("haply connection from " + address + " refused: " + refused->reason);
+  return refused;
+}
+
+Commander Server::admitHaply(const net::Endpoint& remote) {
+  const std::string address = remote.addressText();
+  admission_.enter(sourceOf(address));
+  const scene::ClientId id = nextClient_++;
+  throttledLog_.log(spdlog::level::info, address,
+                    fmt::format("client {} connected from {}, haply", id, address));
+  return {id, address, credentials_.identityOf(remote.address, std::nullopt)};
 }
 
 void Server::onHaplyGone(const Commander& client, const std::string& reason) {
@@ -452,6 +457,7 @@ std::map<scene::ClientId, std::size_t> Server::waitingCommands() const {
 }
 
 void Server::onEnding(Session& session) {
+  for (const auto& station : stations_) station->clientEnds(session.id());
   for (const auto& scene : scenes_) scene->clientGone(session.id());
 }
 
@@ -550,6 +556,8 @@ Station* Server::stationOf(wire::LocalSender name) noexcept {
 
 void Server::onConnected(Session& session) {
   admission_.greeted(session);
+  if (const std::string token = session.takeToken(); !token.empty())
+    identify(session, token, wire::LocalSender{0});
   for (const auto& station : stations_) station->onConnected(session);
 }
 

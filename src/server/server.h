@@ -91,7 +91,8 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   ServerStatus status() const override;
   bool addClients(ServerStatus& status) const override;
   void onWebClient(net::Connection connection, std::string_view token, bool ofPage) override;
-  std::optional<Commander> admitHaply(const net::Endpoint& remote, std::string& refusal) override;
+  std::optional<Refused> refuseHaply(const net::Endpoint& remote) override;
+  Commander admitHaply(const net::Endpoint& remote) override;
   void onHaplyGone(const Commander& client, const std::string& reason) override;
   void onHaplyWarning(scene::ClientId client, const std::string& text) override;
 

@@ -39,6 +39,7 @@ for kB in $(seq 200000 4000 228000); do
   ! grep Embree "$work/said" | grep -v "raise the limit" || exit 1
 done
 
+export XDG_RUNTIME_DIR=$work
 # What is printed to a closed standard output is lost, which a script must hear of.
 "$hapticd" serve --listen 127.0.0.1:0 --http off --allow-no-rt >"$work/log" 2>&1 &
 server=$!
@@ -50,6 +51,14 @@ for options in "" --rearm "--rearm --json"; do
   "$hapticd" stop "Phantom@tcp://$address" $options >&- 2>"$work/said" || status=$?  # unquoted: two options
   [ "$status" = 1 ] && grep -q "cannot write to standard output" "$work/said" || { cat "$work/said"; echo "status $status of stop $options"; exit 1; }
 done
+
+# What is in the place of the server's own Unix socket stays, and is named with one remedy.
+taken=$XDG_RUNTIME_DIR/hapticd/${address##*:}.sock
+kill "$server"
+wait "$server" || true
+: >"$taken"
+"$hapticd" serve --listen "$address" --http off --allow-no-rt --seconds 0.2 >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+[ -f "$taken" ] && [ "$(grep -o 'choose another path' "$work/log" | wc -l)" = 1 ] || { cat "$work/log"; exit 1; }
 
 # The log names each port that it opens.
 printf '[compat]\nhaply = "127.0.0.1:0"\n' >"$work/haply.toml"

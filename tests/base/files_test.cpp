@@ -174,6 +174,18 @@ TYPED_TEST(FilesTest, CreatesFoldersOnceOrTwice) {
   expectError([&] { this->files.createFolder(deep / "a.txt" / "four"); }, ENOTDIR, deep);
 }
 
+// What a server keeps there is not for others to replace, whatever the umask of its user.
+TEST(SystemFiles, LetsNobodyElseWriteIntoFolders) {
+  const OnDisk disk;
+  const mode_t before = umask(0);
+  SystemFiles().createFolder(disk.folder() / "one" / "two");
+  umask(before);
+  for (const char* each : {"one", "one/two"}) {
+    EXPECT_EQ(std::filesystem::status(disk.folder() / each).permissions(), std::filesystem::perms(0755))
+        << each;
+  }
+}
+
 // Linux has one file that is always full.
 TEST(SystemFiles, NamesThePathOfAFullDisk) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";

@@ -50,6 +50,17 @@ TEST_F(LocalSocket, AFileAtItsPathStays) {
   EXPECT_EQ(std::filesystem::file_size(path_), 5U);
 }
 
+// As after somebody has tidied up, and started another server.
+TEST_F(LocalSocket, WhatTookItsPathStaysWhenItEnds) {
+  auto first = std::make_unique<LocalListener>(loop_, path_, [](Connection) {});
+  std::filesystem::remove(path_);
+  std::vector<Connection> accepted;
+  const LocalListener second(loop_, path_, [&](Connection c) { accepted.push_back(std::move(c)); });
+  first.reset();
+  const Connection client = connectLocal(loop_, path_);
+  EXPECT_TRUE(pumpUntil(loop_, [&] { return accepted.size() == 1; }));
+}
+
 // A server of a desktop session, and a user from su, cron or a container, where the variable is not set.
 TEST_F(LocalSocket, IsFoundInTheFolderOfASessionThatTheEnvironmentDoesNotName) {
   const Endpoint listening{kLoopbackAddress, 1};

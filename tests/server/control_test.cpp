@@ -10,6 +10,7 @@
 
 #include "feeling.h"
 #include "hapticd/client.h"
+#include "log_lines.h"
 #include "running_server.h"
 #include "scripted_peer.h"
 #include "server/session/refusal_codes.h"
@@ -162,6 +163,28 @@ TEST_F(ControlTest, OnlyTheFirstClientCommandsUntilItDisconnects) {
     second->send(kUp);
     return lastForce(*second) > 0.5;
   }));
+}
+
+// The server waits 2 s for it to read the reason: control and hand do not wait with it.
+TEST_F(ControlTest, AClientThatTheServerEndsKeepsNeitherControlNorHand) {
+  LogLines log;
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  const auto first = peer();
+  const auto second = peer();
+  first->send(wire::SetObjectNumber{2});
+  hold(*first, 0, 0, 0);
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  first->sendPayload(wire::kindOf<wire::SetVertex>, std::vector<std::byte>(3));  // and does not read
+  ASSERT_TRUE(second->until([&] {
+    second->send(wire::HoldHand{.hold = 1, .position = {10, 20, 5}});
+    second->send(kUp);
+    return lastForce(*second) > 0.5;
+  }));
+  EXPECT_TRUE(untilHandAt(*second, {0.010, 0.020, 0.005}, 2e-3));
+  EXPECT_EQ(log.count("disconnected: malformed"), 0U) << log.text();
 }
 
 // A client that gets control in the middle of its batch does not get the rest of it.

@@ -22,6 +22,7 @@ struct ShownDevice {
   device::DeviceState state;
   Vec3 force_N = Vec3::Zero();  ///< as written to the device
   bool inUse = false;           ///< a client's force is held
+  bool off = false;             ///< forces are stopped, latched or not enabled
 };
 
 /// One state frame. `config`: with what only the first frame of a connection carries.

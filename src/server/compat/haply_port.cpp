@@ -71,6 +71,8 @@ void HaplyPort::onRequest(const net::HttpRequest& request, const net::HttpReply&
     reply(net::HttpResponse::of(403, refused + '\n'));
   } else if (clients_.size() >= kMostClients) {
     reply(net::HttpResponse::of(503, fmt::format("{} clients are connected, the most\n", kMostClients)));
+  } else if (const auto notAdmitted = owner_.refuseHaply(request.remote)) {
+    reply(net::HttpResponse::of(notAdmitted->status, notAdmitted->reason + '\n'));
   } else {
     net::HttpResponse response = net::HttpResponse::of(426, "this port is a WebSocket of JSON messages\n");
     response.headers = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
@@ -81,14 +83,11 @@ void HaplyPort::onRequest(const net::HttpRequest& request, const net::HttpReply&
 }
 
 void HaplyPort::add(net::Connection connection) {
-  std::string refusal;
-  const auto who = owner_.admitHaply(connection.remote(), refusal);
-  if (!who) return connection.abort(refusal);
   auto client = std::make_unique<Client>();
-  client->who = *who;
+  client->who = owner_.admitHaply(connection.remote());
   client->connection = std::move(connection);
   Client& added = *client;
-  clients_.emplace(who->id, std::move(client));
+  clients_.emplace(added.who.id, std::move(client));
   added.connection.start(
       {.onConnected = {},
        .onBytes =
@@ -97,7 +96,7 @@ void HaplyPort::add(net::Connection connection) {
            },
        .onDrained = {},
        .onPeerGone = [&added](const std::string& reason) { added.connection.abort(reason); },
-       .onClosed = [this, id = who->id](const std::string& reason) { gone(id, reason); }});
+       .onClosed = [this, id = added.who.id](const std::string& reason) { gone(id, reason); }});
   const std::string first = frame(added, true);
   added.connection.send(std::as_bytes(std::span(first)));
   added.connection.flush();
@@ -155,7 +154,8 @@ std::string HaplyPort::frame(const Client& client, bool config) const {
   std::vector<haply::ShownDevice> shown;
   for (const auto& station : stations_) {
     const realtime::TickReport& last = station->lastTick();
-    shown.push_back({station->name(), last.device, last.force_N, !last.remote.heldForce_N.isZero(0)});
+    const bool off = last.guard.stopped || last.guard.latched != 0 || !last.guard.armed;
+    shown.push_back({station->name(), last.device, last.force_N, !last.remote.heldForce_N.isZero(0), off});
   }
   return haply::stateFrame(client.who.id, shown, config);
 }

@@ -22,8 +22,14 @@ namespace hapticd::server {
 class HaplyOwner {
  public:
   virtual ~HaplyOwner() = default;
-  /// A new client; nothing, with the reason, when the server is full or the client's network is not trusted.
-  virtual std::optional<Commander> admitHaply(const net::Endpoint& remote, std::string& refusal) = 0;
+  /// Whether a client from there is let in; otherwise the status and the reason for its request.
+  struct Refused {
+    int status = 0;
+    std::string reason;
+  };
+  virtual std::optional<Refused> refuseHaply(const net::Endpoint& remote) = 0;
+  /// A new client, which was not refused.
+  virtual Commander admitHaply(const net::Endpoint& remote) = 0;
   /// The client is gone; its force has ended.
   virtual void onHaplyGone(const Commander& client, const std::string& reason) = 0;
   /// A line for the log that a client can cause at any rate: throttle it. `source` is the client.

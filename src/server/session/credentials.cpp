@@ -61,12 +61,13 @@ Credentials::Credentials(const ServerConfig& config, std::uint32_t serverUser)
   std::istringstream lines(readPrivate(config.tokens));
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
-    std::istringstream words(line.substr(0, line.find('#')));
+    std::istringstream words(line);
     std::string role;
     std::string token;
     std::string more;
-    if (!(words >> role)) continue;
+    if (!(words >> role) || role.front() == '#') continue;
     words >> token >> more;
+    if (more.starts_with('#')) more.clear();  // inside a token it is a character of it
     const std::string place = config.tokens + ":" + std::to_string(number) + ": ";
     const auto named = [&](ClientRole each) { return role == nameOf(each); };
     const bool known =

@@ -109,6 +109,9 @@ class Session {
   /// The connection was opened by a page in a browser.
   bool ofPage() const noexcept { return ofPage_; }
   void setOfPage() noexcept { ofPage_ = true; }
+  /// A token that came before the greeting: nobody hears an answer so early.
+  void setToken(std::string_view token) { token_ = token; }
+  std::string takeToken() { return std::exchange(token_, {}); }
   /// For a Unix socket, the number of the client's user.
   const std::optional<std::uint32_t>& user() const noexcept { return user_; }
 
@@ -209,6 +212,7 @@ class Session {
   Identity identity_;
   std::uint64_t key_ = 0;
   bool ofPage_ = false;
+  std::string token_;
   std::optional<std::uint32_t> user_;
   std::string failure_;
   int mostPerSecond_ = INT_MAX;

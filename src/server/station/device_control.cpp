@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/reports/client_tick.h"
+#include "server/session/identity.h"
 
 namespace hapticd::server {
 namespace {
@@ -66,7 +67,8 @@ void DeviceControl::stopForces(const Order& order, const Sender& sender) {
 
 bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool faults, Refusal& refusal) {
   // One connection keeps its order by itself.
-  const bool otherConnection = order.address == stop_.address && order.client != stop_.client;
+  const bool otherConnection =
+      sourceOf(order.address) == sourceOf(stop_.address) && order.client != stop_.client;
   const bool sentEarlier =
       otherConnection && order.sent < stop_.sent && stop_.sent - order.sent <= kLongestTravel;
   const Refusal later{RefusalCode::none, "Rearm_Forces ignored: the forces were stopped after it was sent"};
@@ -77,11 +79,11 @@ bool DeviceControl::rearmForces(const Order& order, const Sender& sender, bool f
   }
   const auto gone = [this](const Stop& stop) { return isGone(stop); };
   const std::vector<Stop> before = stops_;
+  const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
   if (sender.isOperator || (sender.isPage && sender.mayCommand && !sender.hasOperators &&
                             std::all_of(stops_.begin(), stops_.end(), gone))) {
     stops_.clear();
   }
-  const bool undoes = std::erase_if(stops_, [&](const Stop& stop) { return stop.isOf(sender); }) > 0;
   if (!stops_.empty()) {
     const Stop& other = stops_.back();
     refusal = {RefusalCode::stoppedByOther, "Rearm_Forces refused: " + other.description +

@@ -324,10 +324,15 @@ void Station::endStreams(scene::ClientId client) {
   impl_->streamed.clientGone(client);
 }
 
-void Station::clientGone(scene::ClientId client) {
-  impl_->control.clientGone(client);
+void Station::clientEnds(scene::ClientId client) {
+  impl_->control.letGo(client);
   impl_->streamed.clientGone(client);
   impl_->roles->release(client);
+}
+
+void Station::clientGone(scene::ClientId client) {
+  clientEnds(client);
+  impl_->control.clientGone(client);
   impl_->holding.erase(client);
   impl_->outbox.clientGone(client);
 }

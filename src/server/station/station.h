@@ -92,6 +92,9 @@ class Station {
   void onSubscribed(Session& session, wire::LocalSender name);
   /// The client is gone: its remote contacts and its held force fade.
   void endStreams(scene::ClientId client);
+  /// The server ends the connection, which lasts until the client has read why. The client's streams fade,
+  /// and it has neither the hand nor control any more.
+  void clientEnds(scene::ClientId client);
   void clientGone(scene::ClientId client);
   /// The client belongs to the program with this key.
   void setKey(scene::ClientId client, std::uint64_t key);

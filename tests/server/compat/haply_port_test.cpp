@@ -230,9 +230,16 @@ TEST_F(Haply, AStopOfAnyClientStopsItsForces) {
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::StopForces{});
   ASSERT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isFree).is_null());
-  for (int i = 0; i < 20; ++i) EXPECT_TRUE(isFree(client.forced({1, 0, 0})));
+  const auto isReady = [](const json& frame) -> bool { return frame["inverse3"][0]["status"]["ready"]; };
+  for (int i = 0; i < 20; ++i) {
+    const json frame = client.forced({1, 0, 0});
+    EXPECT_TRUE(isFree(frame));
+    EXPECT_FALSE(isReady(frame)) << "the program sees that it pushes nothing";
+  }
   peer.send(wire::RearmForces{});
-  EXPECT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed).is_null());
+  const json pushed = untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed);
+  ASSERT_FALSE(pushed.is_null());
+  EXPECT_TRUE(isReady(pushed));
 }
 
 TEST_F(Haply, RefusesPagesAndForeignNames) {
@@ -308,9 +315,12 @@ TEST(HaplyPort, ANetworkIsRefusedUntilItIsTrusted) {
   {
     RunningServer server(config);
     EXPECT_THROW(HaplyClient(*server.server().haplyAddress()), device::haply::ConnectionError);
+    const Answer refused = get(*server.server().haplyAddress(), "/");
+    EXPECT_EQ(refused.status, 403) << "a program hears why";
+    EXPECT_EQ(refused.body, "this port is not encrypted, and 127.0.0.1 is not in trusted_networks\n");
     EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: this port is not encrypted, and 127.0.0.1 "
                         "is not in trusted_networks"),
-              1U)
+              2U)
         << log.text();
   }
   config.trustedNetworks = {"127.0.0.0/8"};
@@ -328,7 +338,10 @@ TEST(HaplyPort, ItsClientsCountAmongAllConnections) {
   {
     HaplyClient first(port);
     EXPECT_THROW(HaplyClient{port}, device::haply::ConnectionError);
-    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: the server is full"), 1U) << log.text();
+    const Answer refused = get(port, "/");
+    EXPECT_EQ(refused.status, 503);
+    EXPECT_EQ(refused.body, "the server is full\n");
+    EXPECT_EQ(log.count("haply connection from 127.0.0.1 refused: the server is full"), 2U) << log.text();
   }
   const auto end = std::chrono::steady_clock::now() + kLimit;
   while (log.count("(127.0.0.1, haply) disconnected") == 0 && std::chrono::steady_clock::now() < end)

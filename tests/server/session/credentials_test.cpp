@@ -66,6 +66,17 @@ TEST_F(CredentialsTest, ATokenGivesItsRoleAndTheOthersObserve) {
     EXPECT_FALSE(some.check(wrong, wrong, 0, error_)) << wrong;
 }
 
+// Cut there it would be a weaker one.
+TEST_F(CredentialsTest, ATokenMayHaveAHash) {
+  write("owner 0123456789abcdef#more\noperator #123456789abcdef #the panel\n");
+  Credentials some(config_, kUser);
+  EXPECT_FALSE(some.check("0123456789abcdef", "a", 0, error_));
+  const auto owner = some.check("0123456789abcdef#more", "a", 0, error_);
+  ASSERT_TRUE(owner);
+  EXPECT_EQ(owner->role, ClientRole::owner);
+  EXPECT_TRUE(some.check("#123456789abcdef", "a", 0, error_));
+}
+
 TEST_F(CredentialsTest, TenWrongTokensAMinuteBlockTheirAddressAlone) {
   Credentials some(config_, kUser);
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(some.check("0123456789abcdef", "10.0.0.1", i * kSecond, error_));

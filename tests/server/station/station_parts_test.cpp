@@ -166,6 +166,9 @@ TEST_F(HoldTest, ARearmNeverUndoesALaterStop) {
   EXPECT_FALSE(rearms(order(100, 60, "10.0.0.1")));
   EXPECT_FALSE(rearms(order(101, 49, "10.0.0.1"))) << "sent earlier by the same machine";
   EXPECT_TRUE(guard_.stopped());
+  control_.stopForces(order(100, 50, "127.0.0.1"), anyone);
+  EXPECT_FALSE(rearms(order(101, 49, "127.0.0.2"))) << "this machine by either address";
+  control_.stopForces(order(100, 50, "10.0.0.1"), anyone);
   EXPECT_TRUE(rearms(order(101, 49, "10.0.0.2"))) << "another machine has another clock";
   EXPECT_FALSE(guard_.stopped());
   control_.stopForces(order(200, 150, "10.0.0.1"), anyone);
@@ -253,6 +256,12 @@ TEST_F(RearmTest, APageDoesOnceTheClientIsGoneAndThereIsNoOperator) {
   EXPECT_FALSE(rearms(page)) << "an operator can do it";
   page.hasOperators = false;
   EXPECT_TRUE(rearms(page));
+  stop(client(3));
+  stop(page);
+  EXPECT_FALSE(rearms(page)) << "it undoes its own";
+  stop(page);
+  control_.clientGone(3);
+  EXPECT_TRUE(rearms(page)) << "its own, and that of the program that is gone";
 }
 
 TEST_F(RearmTest, TheConnectionsOfOneProgramAreOne) {

@@ -8,6 +8,7 @@
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <memory>
+#include <string>
 #include <thread>
 
 #include "net/endpoint.h"
@@ -16,7 +17,9 @@ namespace hapticd::test {
 
 class WebTunnel {
  public:
-  explicit WebTunnel(const net::Endpoint& server) : server_(server) {
+  /// `authorization` is a header of each request.
+  explicit WebTunnel(const net::Endpoint& server, std::string authorization = "")
+      : server_(server), authorization_(std::move(authorization)) {
     accept();
     thread_ = std::thread([this] { context_.run(); });
   }
@@ -34,7 +37,10 @@ class WebTunnel {
   struct Link : std::enable_shared_from_this<Link> {
     explicit Link(Tcp::socket socket) : near(std::move(socket)), far(near.get_executor()) {}
 
-    void start(const net::Endpoint& server) {
+    void start(const net::Endpoint& server, const std::string& authorization) {
+      far.set_option(boost::beast::websocket::stream_base::decorator([&](auto& request) {
+        if (!authorization.empty()) request.set(boost::beast::http::field::authorization, authorization);
+      }));
       far.next_layer().connect({boost::asio::ip::address_v4(server.address), server.port});
       far.handshake(server.text(), "/vrpn");
       far.binary(true);
@@ -74,7 +80,7 @@ class WebTunnel {
     acceptor_.async_accept([this](Error error, Tcp::socket socket) {
       if (error) return;
       try {
-        std::make_shared<Link>(std::move(socket))->start(server_);
+        std::make_shared<Link>(std::move(socket))->start(server_, authorization_);
       } catch (const std::exception&) {
         // The peer sees its connection close.
       }
@@ -83,6 +89,7 @@ class WebTunnel {
   }
 
   const net::Endpoint server_;
+  const std::string authorization_;
   boost::asio::io_context context_{1};
   Tcp::acceptor acceptor_{context_, {boost::asio::ip::address_v4::loopback(), 0}};
   std::thread thread_;

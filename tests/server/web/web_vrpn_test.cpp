@@ -1,6 +1,10 @@
 // A VRPN session over the HTTP port's WebSocket behaves like one over TCP.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
 
 #include "feeling.h"
 #include "http_client.h"
@@ -134,6 +138,27 @@ TEST_F(WebVrpn, TheStateShowsActiveEffects) {
   EXPECT_FALSE(stateWhen(web(), active(true)).is_null());
   page.send(wire::StopEffect{1});
   EXPECT_FALSE(stateWhen(web(), active(false)).is_null());
+}
+
+TEST(WebVrpnToken, OneThatTheRequestPresentsIsTakenOrRefusedByAText) {
+  const std::string file = testing::TempDir() + "web-token-" + std::to_string(getpid());
+  std::ofstream(file) << "operator 0123456789abcdef\n";
+  std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+  server::ServerConfig config = withWeb();
+  config.tokens = file;
+  RunningServer server(config);
+  const net::Endpoint web = *server.server().webAddress();
+  WebTunnel right(web, "Bearer 0123456789abcdef");
+  WebTunnel wrong(web, "Bearer 0123456789abcde0");
+  ScriptedPeer taken(right.address());
+  ASSERT_TRUE(taken.untilConnected());
+  EXPECT_FALSE(stateWhen(web, [](const json& state) {
+                 return state["clients"].size() == 1 && state["clients"][0]["role"] == "operator";
+               }).is_null());
+  ScriptedPeer refused(wrong.address());
+  EXPECT_TRUE(refused.untilText("Identify refused: wrong token"));
+  EXPECT_TRUE(taken.texts().empty());
+  std::filesystem::remove(file);
 }
 
 TEST_F(WebVrpn, DisconnectsAWebSocketThatDoesNotSpeakVrpn) {
