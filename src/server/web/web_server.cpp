@@ -60,6 +60,15 @@ void addHeaders(net::HttpResponse& response) {
   }
 }
 
+// Empty where there is none. The scheme has no case.
+std::string bearerToken(std::string_view field) {
+  constexpr std::string_view kScheme = "bearer ";
+  const auto same = [](char a, unsigned char b) { return a == static_cast<char>(std::tolower(b)); };
+  const bool has =
+      field.size() > kScheme.size() && std::equal(kScheme.begin(), kScheme.end(), field.begin(), same);
+  return std::string(has ? field.substr(kScheme.size()) : "");
+}
+
 }  // namespace
 
 WebServer::WebServer(net::Loop& loop, const net::Endpoint& local, const std::vector<std::string>& allowed,
@@ -124,12 +133,11 @@ void WebServer::route(const net::HttpRequest& request, const net::HttpReply& rep
     net::HttpResponse response =
         net::HttpResponse::of(426, "/vrpn is a WebSocket that carries a VRPN stream\n");
     response.headers = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
-    constexpr std::string_view kBearer = "Bearer ";
-    const std::string_view field = request.header("authorization");
-    response.onWebSocket =
-        [this, ofPage = !request.header("origin").empty(),
-         token = std::string(field.starts_with(kBearer) ? field.substr(kBearer.size()) : "")](
-            net::Connection connection) { owner_.onWebClient(std::move(connection), token, ofPage); };
+    response.onWebSocket = [this, ofPage = !request.header("origin").empty(),
+                            token =
+                                bearerToken(request.header("authorization"))](net::Connection connection) {
+      owner_.onWebClient(std::move(connection), token, ofPage);
+    };
     respond(reply, std::move(response));
   } else if (path == "/api/state") {
     sendState(reply, &stateJson, "application/json");

@@ -148,7 +148,7 @@ TEST(WebVrpnToken, OneThatTheRequestPresentsIsTakenOrRefusedByAText) {
   config.tokens = file;
   RunningServer server(config);
   const net::Endpoint web = *server.server().webAddress();
-  WebTunnel right(web, "Bearer 0123456789abcdef");
+  WebTunnel right(web, "bearer 0123456789abcdef");
   WebTunnel wrong(web, "Bearer 0123456789abcde0");
   ScriptedPeer taken(right.address());
   ASSERT_TRUE(taken.untilConnected());
