@@ -146,10 +146,13 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   buttons(frame.buttons, touching, out);
   const bool contactEnded = touching_ && !touching;
   const bool contactChanged = touching_ != touching;
-  if (tick.time < due_ && !contactEnded) return;
-  // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
-  const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
-  due_ = std::max(due + period_, tick.time - period_ / 2);
+  if (tick.time >= due_) {
+    // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
+    const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
+    due_ = std::max(due + period_, tick.time - period_ / 2);
+  } else if (!contactChanged) {
+    return;
+  }
   now_ = tick.time;
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);

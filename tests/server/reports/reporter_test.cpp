@@ -230,6 +230,29 @@ TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
   EXPECT_TRUE(out_.empty());
 }
 
+// A touch may be shorter than a report period.
+TEST_F(ReporterTest, BeginAndEndOfAContactAreReportedBetweenTwoPeriodsAndDoNotMoveThem) {
+  config_.reportRate_Hz = 100;
+  std::vector<int> at;
+  for (int i = 0; i < 45; ++i) {
+    if (i == 13 || i == 33) touch();
+    if (i == 16 || i == 33 + 2) {
+      tick_.rendering = {};
+      tick_.force_N = Vec3::Zero();
+    }
+    step();
+    if (reported<wire::IsTouching>().empty()) continue;
+    at.push_back(i);
+    if (i == 13 || i == 33) {
+      EXPECT_EQ(reported<wire::IsTouching>()[0].touching, 1);
+      EXPECT_TRUE(isReliable<wire::IsTouching>());
+      EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+      EXPECT_EQ(reported<wire::Angle>().at(0).touching, 1);
+    }
+  }
+  EXPECT_EQ(at, (std::vector<int>{0, 10, 13, 16, 20, 30, 33, 35, 40}));
+}
+
 TEST_F(ReporterTest, TheReportRateIsKeptAndButtonsAreReportedAtOnce) {
   config_.reportRate_Hz = 100;
   step();
