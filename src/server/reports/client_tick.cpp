@@ -24,7 +24,6 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
   ClientTick clientTick;
   clientTick.proxy = reported(tick, rendering.proxy_m);
   clientTick.hip = reported(tick, tick.device.position_m);
-  clientTick.scp = reported(tick, rendering.scp_m);
   clientTick.velocity = linear * tick.device.velocity_m_per_s / kWorldPerReported;
   clientTick.angularVelocity = rotation * tick.device.angularVelocity_rad_per_s;
   clientTick.orientation = (Quat(rotation) * tick.device.orientation).normalized();
@@ -34,10 +33,11 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
   clientTick.touching = rendering.touching;
   clientTick.object = rendering.touching ? rendering.touchedObject : -1;
   clientTick.depth = rendering.touching ? rendering.depth_m * scaleOf(linear) / kWorldPerReported : 0;
-  if (rendering.touching) {
+  if (const realtime::Contact* contact = touchedContact(rendering)) {
     const Vec3 stylus = tick.device.orientation * Vec3::UnitY();
     clientTick.angle_deg =
-        std::acos(std::clamp(stylus.dot(rendering.normal), -1.0, 1.0)) * 180 / std::numbers::pi;
+        std::acos(std::clamp(stylus.dot(contact->normal), -1.0, 1.0)) * 180 / std::numbers::pi;
+    clientTick.scp = reported(tick, contact->point_m);
   }
   return clientTick;
 }

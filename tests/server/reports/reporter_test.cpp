@@ -67,6 +67,12 @@ class ReporterTest : public ::testing::Test {
     rendering.normalForce_N = Vec3(0, 0, 500 * depth_m);
     tick_.force_N = rendering.normalForce_N + Vec3(0.1, 0, 0);
     rendering.scp_m = rendering.proxy_m;
+    rendering.contactCount = 1;
+    rendering.contacts[0] = {.object = 3,
+                             .triangle = 0,
+                             .point_m = rendering.proxy_m,
+                             .normal = Vec3::UnitZ(),
+                             .force_N = rendering.normalForce_N};
   }
 
   DeviceConfig config_;
@@ -169,6 +175,30 @@ TEST_F(ReporterTest, ContactIsReportedOnChange) {
   step();
   EXPECT_EQ(reported<wire::Force>().size(), 1U);
   EXPECT_EQ(reported<wire::Dop>().size(), 1U);
+}
+
+// Of several touched objects, the one that pushes hardest gives all: the directions in between are of none.
+TEST_F(ReporterTest, PointAndAngleAreThoseOfTheTouchedObject) {
+  touch();
+  realtime::Rendering& rendering = tick_.rendering;
+  rendering.normal = Vec3(1, 0, 1).normalized();
+  rendering.scp_m = Vec3(0.0003, 0, 0.0003);
+  rendering.contactCount = 2;
+  rendering.contacts[0] = {.object = 5,
+                           .triangle = 0,
+                           .point_m = Vec3(0, 0, 0.001),
+                           .normal = Vec3::UnitX(),
+                           .force_N = Vec3::UnitX()};
+  rendering.contacts[1] = {.object = 3,
+                           .triangle = 0,
+                           .point_m = Vec3(0.001, 0, 0),
+                           .normal = Vec3::UnitY(),
+                           .force_N = Vec3::UnitY()};
+  step();
+  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_NEAR(reported<wire::Angle>().at(0).angle, 0, 1e-9);
+  EXPECT_EQ(reported<wire::Scp>().at(0).position, (wire::F64x3{0.001, 0, 0}));
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().at(2).position, (wire::F64x3{0.001, 0, 0}));
 }
 
 // As a datagram it may have been lost, and nothing else would tell the client.
