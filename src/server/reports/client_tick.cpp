@@ -22,6 +22,7 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
   const realtime::Rendering& rendering = tick.rendering;
 
   ClientTick clientTick;
+  clientTick.metre = scaleOf(linear) / kWorldPerReported;
   clientTick.proxy = reported(tick, rendering.proxy_m);
   clientTick.hip = reported(tick, tick.device.position_m);
   clientTick.velocity = linear * tick.device.velocity_m_per_s / kWorldPerReported;
@@ -32,7 +33,7 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
       rotation * (forceReport == ForceReport::normal ? rendering.normalForce_N : tick.force_N);
   clientTick.touching = rendering.touching;
   clientTick.object = rendering.touching ? rendering.touchedObject : -1;
-  clientTick.depth = rendering.touching ? rendering.depth_m * scaleOf(linear) / kWorldPerReported : 0;
+  clientTick.depth = rendering.touching ? rendering.depth_m * clientTick.metre : 0;
   if (const realtime::Contact* contact = touchedContact(rendering)) {
     const Vec3 stylus = tick.device.orientation * Vec3::UnitY();
     clientTick.angle_deg =

@@ -81,14 +81,13 @@ wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, 
   if (clientTick.gripper_rad) state.flags |= wire::kHandHasGripper;
   if ((remote.status & realtime::kRemoteEnergySpent) != 0) state.flags |= wire::kHandEnergySpent;
   if ((remote.status & realtime::kRemoteCorrectionsHeld) != 0) state.flags |= wire::kHandCorrectionsHeld;
-  const double metre = tick.T_world_device.linear().col(0).norm() / kWorldPerReported;
   for (std::uint32_t i = 0; i < remote.count; ++i) {
     const realtime::RemoteContactReport& contact = remote.contacts[i];
     const Vec3 proxy = reported(tick, contact.proxy_m.cast<double>());
     const Vec3 force = rotation * contact.force_N.cast<double>();
     state.contacts.values.insert(state.contacts.values.end(),
                                  {double(contact.id), proxy.x(), proxy.y(), proxy.z(), force.x(), force.y(),
-                                  force.z(), contact.depth_m * metre});
+                                  force.z(), contact.depth_m * clientTick.metre});
   }
   return state;
 }
@@ -235,9 +234,9 @@ void Reporter::buttons(std::uint32_t buttons, bool touching, std::vector<Outgoin
   }
 }
 
-bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orientation) {
+bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orientation, double metre) {
   Sent& sent = sensors_[static_cast<std::size_t>(sensor)];
-  const bool far = !((position - sent.position).norm() <= config_.linearTolerance_m);
+  const bool far = !((position - sent.position).norm() <= config_.linearTolerance_m * metre);
   if (!far && config_.linearTolerance_m > 0 &&
       sent.orientation.angularDistance(orientation) <= config_.angularTolerance_rad) {
     return false;
@@ -255,7 +254,7 @@ void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, s
   const Quat orientation = toFrame * clientTick.orientation;
   const auto pose = [&](std::uint32_t kind, std::int32_t sensor, const Vec3& world) {
     const Vec3 position = toFrame * (world - frame.origin);
-    const bool changed = moved(sensor, position, orientation);
+    const bool changed = moved(sensor, position, orientation, clientTick.metre);
     if (!changed && !sensors_[static_cast<std::size_t>(sensor)].last.settles(now_)) return false;
     if (!wants(kind)) return changed;
     const std::int32_t number = view_ == View::device ? sensor : 0;
@@ -307,7 +306,7 @@ bool Reporter::contact(const ClientTick& clientTick, std::vector<Outgoing>& out)
   };
   const bool pushed = ended || (clientTick.force_N - force_N_).norm() > kForceStep_N;
   if (pushed) force_N_ = clientTick.force_N;
-  const bool sunk = std::abs(clientTick.depth - depth_) > kDepthStep_m;
+  const bool sunk = std::abs(clientTick.depth - depth_) > kDepthStep_m * clientTick.metre;
   if (sunk) depth_ = clientTick.depth;
   const bool other = std::exchange(object_, clientTick.object) != clientTick.object;
   bool changed = report(pushed, forceChange_, wire::Force{array(clientTick.force_N)});

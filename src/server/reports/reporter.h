@@ -120,7 +120,8 @@ class Reporter {
   void poses(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
 
   bool wants(std::uint32_t kind) const noexcept { return (choice_.kinds & kind) != 0; }
-  bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation);
+  bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation,
+             double metre);
   wire::F64x4 quaternion(const geometry::Quat& q) const;
 
   const DeviceConfig config_;

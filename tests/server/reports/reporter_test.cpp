@@ -145,6 +145,29 @@ TEST_F(ReporterTest, PoseIsReportedWhenItChangedByMoreThanTheTolerance) {
   EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
 }
 
+// A client may have its world in metres, or in micrometres: the same motions are reported to it.
+TEST_F(ReporterTest, TolerancesAreLengthsOfTheDevice) {
+  for (const double worldUnitsPerMetre : {1.0, 1e6}) {
+    reporter_.reset();
+    tick_.T_world_device = Affine(Eigen::UniformScaling<double>(worldUnitsPerMetre));
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3::Zero();
+    touch(0.002);
+    step();
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);
+    tick_.rendering.depth_m = 0.002009;
+    step();
+    EXPECT_TRUE(reported<wire::TrackerPosQuat>().empty());
+    EXPECT_TRUE(reported<wire::TrackerVelocity>().empty());
+    EXPECT_TRUE(reported<wire::Dop>().empty());
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0011, 0, 0);
+    tick_.rendering.depth_m = 0.002011;
+    step();
+    EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
+    EXPECT_EQ(reported<wire::TrackerVelocity>().size(), 1U);
+    EXPECT_EQ(reported<wire::Dop>().size(), 1U);
+  }
+}
+
 TEST_F(ReporterTest, ZeroToleranceMeansEveryPeriod) {
   config_.linearTolerance_m = 0;
   step();
