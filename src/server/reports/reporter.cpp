@@ -46,6 +46,7 @@ wire::GuardState guardState(const realtime::GuardReport& guard) {
 
 wire::ContactList contactList(const TickReport& tick) {
   wire::ContactList list{.tick = tick.tick, .time = tick.time, .contacts = {}};
+  if (!tick.rendering.touching) return list;  // adhesion pulls without a touch
   const geometry::Mat3 rotation = rotationOf(tick.T_world_device);
   for (std::uint32_t i = 0; i < tick.rendering.contactCount; ++i) {
     const realtime::Contact& contact = tick.rendering.contacts[i];

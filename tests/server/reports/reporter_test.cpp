@@ -581,6 +581,22 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   EXPECT_TRUE(out_.empty());
 }
 
+// A plane that adheres pulls after the touch, too.
+TEST_F(ReporterTest, TheEndOfATouchIsAnEmptyListAlsoWhereAPlaneStillPulls) {
+  choice_.kinds = wire::kReportContacts;
+  touch();
+  step();
+  ASSERT_EQ(reported<wire::ContactList>().size(), 1U);
+  tick_.rendering = {};
+  tick_.rendering.contactCount = 1;
+  tick_.rendering.contacts[0] = {-1, 0, Vec3::Zero(), Vec3::UnitZ(), Vec3(0, 0, -0.1)};
+  step();
+  ASSERT_EQ(reported<wire::ContactList>().size(), 1U);
+  EXPECT_TRUE(reported<wire::ContactList>().at(0).contacts.values.empty());
+  step();
+  EXPECT_TRUE(out_.empty());
+}
+
 TEST_F(ReporterTest, AllOf32ButtonsAreReported) {
   choice_.kinds = wire::kReportHand;
   choice_.rate_Hz = config_.reportRate_Hz;
