@@ -146,7 +146,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   buttons(frame.buttons, touching, out);
   const bool contactEnded = touching_ && !touching;
   const bool contactChanged = touching_ != touching;
-  if (tick.time >= due_) {
+  const bool inBetween = tick.time < due_;
+  if (!inBetween) {
     // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
     const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
     due_ = std::max(due + period_, tick.time - period_ / 2);
@@ -154,6 +155,7 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
     return;
   }
   now_ = tick.time;
+  const std::size_t first = out.size();
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);
   if (contactEnded) {
@@ -168,6 +170,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, contactChanged});
   poses(tick, frame, out);
   tickReport(tick, clientTick, contactEnded, out);
+  // The end of the contact, which is reliable, may be next: a datagram from before could arrive after it.
+  for (std::size_t i = first; inBetween && i < out.size(); ++i) out[i].reliable = true;
 }
 
 void Reporter::skip(const TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out) {
