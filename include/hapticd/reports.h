@@ -76,7 +76,8 @@ struct ForceReport {
   Vec3 force_N{};  ///< on the hand
 };
 
-/// Penetration depth: the distance from the device to the proxy while an object is touched, else 0.
+/// Penetration depth: the distance from the device to the proxy along the surface normal, without what
+/// friction holds aside; 0 without contact.
 struct DepthReport {
   Time time;
   double depth_m = 0;

@@ -127,7 +127,8 @@ class ForceReport(NamedTuple):
 
 
 class DepthReport(NamedTuple):
-    """Penetration depth: the distance from the device to the proxy while an object is touched, else 0."""
+    """Penetration depth: the distance from the device to the proxy along the surface normal, without what friction holds
+    aside; 0 without contact."""
 
     time: float
     depth_m: float

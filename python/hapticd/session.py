@@ -271,7 +271,7 @@ class Ticks:
         return np.asarray(values[np.maximum(np.cumsum(has) - 1, 0)])
 
     def _derive(self, column: str) -> "npt.NDArray[Any]":
-        touching = self["touching"] if column in ("depth_m", "object", "normal", "contact_point_m") else None
+        touching = self["touching"] if column in ("depth_m", "object") else None
         if column == "time_ns":
             return self._session._wall(self["servo_time_ns"])
         if column == "depth_m":
@@ -279,9 +279,9 @@ class Ticks:
         if column == "object":
             return np.where(touching, self["touched_object"], np.int32(-1))  # type: ignore[arg-type]
         if column == "normal":
-            return np.where(touching[:, None], self["surface_normal"], 0.0)  # type: ignore[index]
+            return self._of_touched("normal", 0.0)
         if column == "contact_point_m":
-            return np.where(touching[:, None], self["scp_m"], np.nan)  # type: ignore[index]
+            return self._of_touched("point_m", np.nan)
         if column == "have_state":
             return self._has(_HAVE_STATE)
         if column == "written":
@@ -325,12 +325,28 @@ class Ticks:
                 table.update({f"{name}_{axis}": flat[:, i] for i, axis in zip(range(flat.shape[1]), axes)})
         return pandas.DataFrame(table, index=pandas.Index(self["time_ns"], name="time_ns"))
 
-    def contacts(self) -> "npt.NDArray[Any]":
-        """One row for each contact of each tick: time_ns, tick, object, triangle, point_m, normal, force_N."""
+    def _contacts_at(self) -> "Tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]":
+        """For each contact the number of its tick's row, and where it stands in the file."""
         number = self["contact_count"].astype(np.int64)
         which = np.repeat(np.arange(len(self)), number)
         nth = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number)
-        at = self._offsets[which] + _FIXED.itemsize + nth * _CONTACT.itemsize
+        return which, self._offsets[which] + _FIXED.itemsize + nth * _CONTACT.itemsize
+
+    def _of_touched(self, field: str, free: float) -> "npt.NDArray[Any]":
+        """A vector of the contact with the touched object."""
+        which, at = self._contacts_at()
+        assert _CONTACT.fields is not None
+        dtype, offset = _CONTACT.fields["object"][:2]
+        object_ = self._session._gather(at + offset, dtype)
+        mask = self["touching"][which] & (object_ == self["touched_object"][which])
+        dtype, offset = _CONTACT.fields[field][:2]
+        values = np.full((len(self), 3), free)
+        values[which[mask]] = self._session._gather(at[mask] + offset, dtype)
+        return values
+
+    def contacts(self) -> "npt.NDArray[Any]":
+        """One row for each contact of each tick: time_ns, tick, object, triangle, point_m, normal, force_N."""
+        which, at = self._contacts_at()
         table = np.empty(len(which), dtype=[("time_ns", "i8"), ("tick", "u8"), *_CONTACT.newbyteorder("=").descr])
         table["time_ns"], table["tick"] = self["time_ns"][which], self["tick"][which]
         assert _CONTACT.fields is not None

@@ -101,6 +101,35 @@ def test_a_fresh_recording(tmp_path: pathlib.Path) -> None:
             session.ticks_of("Omni")
 
 
+def test_the_contact_point_of_a_ball_in_a_corner_is_on_a_wall(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "corner.haptics"
+    (tmp_path / "ball.toml").write_text('[[device]]\nname = "Phantom"\ntool_radius_mm = 3\n')
+    server = Server("--config", str(tmp_path / "ball.toml"), "--record", str(file))
+    corner = np.array([[0, -20, 0], [0, 20, 0], [0, 20, 20], [0, -20, 20], [20, -20, 0], [20, 20, 0]])
+    with hapticd.connect(server.tcp) as hand:
+        hand.hold_hand((10, 0, 10))
+        hand.run_for(0.5)
+        with hand.batch():
+            hand.set_object_count(2)
+            hand.upload_mesh(0, corner, [[0, 1, 2], [0, 2, 3]])
+            hand.upload_mesh(1, corner, [[0, 4, 5], [0, 5, 1]])
+            for wall in (0, 1):
+                hand.set_surface(wall, hapticd.Surface(0.8))
+        for deep in ((0, 0, 1), (1, 0, 0)):
+            hand.hold_hand(deep)
+            hand.run_for(0.4)
+    server.stop()
+    check_against_export(file, tmp_path)
+    with hapticd.Session(file) as session:
+        ticks = session.ticks
+        both = ticks["contact_count"] == 2
+        assert {0, 1} == set(ticks["object"][both])
+        across = np.where(ticks["object"][both] == 0, 0, 2)  # a wall x = 0, a floor z = 0
+        rows = np.arange(both.sum())
+        assert np.allclose(ticks["contact_point_m"][both][rows, across], 0, atol=1e-7)
+        assert np.allclose(ticks["normal"][both][rows, across], 1)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_the_guard_is_told_wherever_it_changes(name: str) -> None:
     with hapticd.Session(RECORDINGS / f"{name}.haptics") as session:

@@ -29,8 +29,8 @@ struct Sample {
   Trips guardLatched;
   std::optional<double> gripper_rad{};
   std::optional<geometry::Vec3> renderedForce_N{};  ///< before the guard
-  std::optional<geometry::Vec3> normal{};           ///< of the touched surface; zero when free
-  std::optional<geometry::Vec3> contactPoint_m{};   ///< on the touched surface; empty when free
+  std::optional<geometry::Vec3> normal{};           ///< of the touched object at that point; zero when free
+  std::optional<geometry::Vec3> contactPoint_m{};   ///< on the touched object; empty when free
   std::optional<std::uint32_t> renderStatus{};      ///< bits of realtime::RenderStatus
   std::optional<Nanos> wakeupError_ns{};
   std::optional<Nanos> compute_ns{};  ///< the servo's time for the tick
@@ -86,8 +86,9 @@ inline Sample sampleOf(const std::string& device, const realtime::TickReport& ti
   sample.guardLatched = Trips(tick.guard.latched);
   sample.gripper_rad = tick.device.gripper_rad;
   sample.renderedForce_N = rendering.force_N;
-  sample.normal = rendering.touching ? rendering.normal : geometry::Vec3(geometry::Vec3::Zero());
-  if (rendering.touching) sample.contactPoint_m = rendering.scp_m;
+  const realtime::Contact* contact = touchedContact(rendering);
+  sample.normal = contact != nullptr ? contact->normal : geometry::Vec3(geometry::Vec3::Zero());
+  if (contact != nullptr) sample.contactPoint_m = contact->point_m;
   sample.renderStatus = rendering.status;
   sample.wakeupError_ns = tick.timing.wakeupError;
   sample.compute_ns = tick.timing.compute;

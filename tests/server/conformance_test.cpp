@@ -84,12 +84,6 @@ class Recording {
 
 class Conformance : public testing::TestWithParam<Mode> {
  protected:
-  static server::ServerConfig config(const Hand& hand) {
-    server::ServerConfig config = hand.config();
-    config.devices[0].linearTolerance_m = 0;  // in so small a world no motion exceeds a millimetre
-    return config;
-  }
-
   void SetUp() override {
     if (isUdp()) {
       recording_.describeUdp(client_.udpPort());
@@ -124,7 +118,7 @@ class Conformance : public testing::TestWithParam<Mode> {
   }
 
   const Hand hand_ = strokingBothCubes();
-  RunningServer server_{config(hand_)};
+  RunningServer server_{hand_.config()};
   Recording recording_{prefix() + ".c2s.tcp.bin"};
   const std::vector<Bytes> datagrams_ =
       isUdp() ? wire::recordedDatagrams("udp.c2s.udp.bin") : std::vector<Bytes>{};

@@ -38,12 +38,16 @@ struct Rendering {
   bool touching = false;
   std::int32_t touchedObject = -1;  ///< the one with the largest force; -1: none, or a plane
   double depth_m = 0;
-  Vec3 normal = Vec3::Zero();  ///< unit, out of the surface; zero without contact
-  Vec3 scp_m = Vec3::Zero();   ///< surface contact point: the proxy less the tool radius along the normal
+  Vec3 normal = Vec3::Zero();  ///< unit, of all faces together: of the normal force; zero without contact
+  Vec3 scp_m = Vec3::Zero();   ///< the proxy less the tool radius along `normal`
   std::uint32_t contactCount = 0;
   std::array<Contact, kMaxContacts> contacts;  ///< one per touched object; their forces sum to contactForce_N
   std::uint32_t status = 0;                    ///< RenderStatus bits
 };
+
+/// The contact that is reported as the one that is touched: null without contact. `normal` and `scp_m` are
+/// those of all faces together, in a corner of none of them.
+const Contact* touchedContact(const Rendering& rendering) noexcept;
 
 enum RenderStatus : std::uint32_t {
   kRenderIterationLimit =

@@ -198,6 +198,15 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   out.touchedObject = std::max_element(first, first + out.contactCount, weaker)->object;
 }
 
+const Contact* touchedContact(const Rendering& rendering) noexcept {
+  if (!rendering.touching) return nullptr;
+  const Contact* const end = rendering.contacts.data() + rendering.contactCount;
+  const Contact* const found = std::find_if(rendering.contacts.data(), end, [&rendering](const Contact& c) {
+    return c.object == rendering.touchedObject;
+  });
+  return found == end ? nullptr : found;
+}
+
 bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, double toolRadius_m) noexcept {
   const double limit = constraint.surface.popthrough_N;
   return constraint.source >= 0 && limit > 0 && stiffness_N_per_m * constraint.depth_m > limit &&

@@ -77,7 +77,7 @@ struct DeviceConfig {
   std::string hand = "script";  ///< simulated device: "script", or a CSV file with the intended path
   double servoRate_Hz = 1000;
   double reportRate_Hz = 1000;
-  double linearTolerance_m = 0.001;  ///< of the reported position (world / 1000)
+  double linearTolerance_m = 0.001;  ///< of the device
   double angularTolerance_rad = 0.02;
   double toolRadius_m = 0;
   std::vector<double> workspace_mm;  ///< min xyz, max xyz; empty: that of the device

@@ -22,9 +22,9 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
   const realtime::Rendering& rendering = tick.rendering;
 
   ClientTick clientTick;
+  clientTick.metre = scaleOf(linear) / kWorldPerReported;
   clientTick.proxy = reported(tick, rendering.proxy_m);
   clientTick.hip = reported(tick, tick.device.position_m);
-  clientTick.scp = reported(tick, rendering.scp_m);
   clientTick.velocity = linear * tick.device.velocity_m_per_s / kWorldPerReported;
   clientTick.angularVelocity = rotation * tick.device.angularVelocity_rad_per_s;
   clientTick.orientation = (Quat(rotation) * tick.device.orientation).normalized();
@@ -33,11 +33,12 @@ ClientTick toClientTick(const realtime::TickReport& tick, ForceReport forceRepor
       rotation * (forceReport == ForceReport::normal ? rendering.normalForce_N : tick.force_N);
   clientTick.touching = rendering.touching;
   clientTick.object = rendering.touching ? rendering.touchedObject : -1;
-  clientTick.depth = rendering.touching ? rendering.depth_m * scaleOf(linear) / kWorldPerReported : 0;
-  if (rendering.touching) {
+  clientTick.depth = rendering.touching ? rendering.depth_m * clientTick.metre : 0;
+  if (const realtime::Contact* contact = touchedContact(rendering)) {
     const Vec3 stylus = tick.device.orientation * Vec3::UnitY();
     clientTick.angle_deg =
-        std::acos(std::clamp(stylus.dot(rendering.normal), -1.0, 1.0)) * 180 / std::numbers::pi;
+        std::acos(std::clamp(stylus.dot(contact->normal), -1.0, 1.0)) * 180 / std::numbers::pi;
+    clientTick.scp = reported(tick, contact->point_m);
   }
   return clientTick;
 }

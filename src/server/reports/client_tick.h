@@ -14,7 +14,9 @@ inline constexpr double kWorldPerReported = 1000;
 
 /// One tick in the world frame: lengths in reported metres (world units / 1000), forces in newtons.
 struct ClientTick {
-  geometry::Vec3 proxy, hip, scp, velocity, force_N;  ///< `velocity`: reported metres per second
+  double metre = 1;                              ///< reported length of a metre of the device
+  geometry::Vec3 proxy, hip, velocity, force_N;  ///< `velocity`: reported metres per second
+  geometry::Vec3 scp = geometry::Vec3::Zero();   ///< of the touched object; zero without contact
   geometry::Quat orientation;
   geometry::Vec3 angularVelocity;  ///< rad/s
   bool touching = false;

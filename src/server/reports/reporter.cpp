@@ -46,6 +46,7 @@ wire::GuardState guardState(const realtime::GuardReport& guard) {
 
 wire::ContactList contactList(const TickReport& tick) {
   wire::ContactList list{.tick = tick.tick, .time = tick.time, .contacts = {}};
+  if (!tick.rendering.touching) return list;  // adhesion pulls without a touch
   const geometry::Mat3 rotation = rotationOf(tick.T_world_device);
   for (std::uint32_t i = 0; i < tick.rendering.contactCount; ++i) {
     const realtime::Contact& contact = tick.rendering.contacts[i];
@@ -81,14 +82,13 @@ wire::HandState handState(const TickReport& tick, const ClientTick& clientTick, 
   if (clientTick.gripper_rad) state.flags |= wire::kHandHasGripper;
   if ((remote.status & realtime::kRemoteEnergySpent) != 0) state.flags |= wire::kHandEnergySpent;
   if ((remote.status & realtime::kRemoteCorrectionsHeld) != 0) state.flags |= wire::kHandCorrectionsHeld;
-  const double metre = tick.T_world_device.linear().col(0).norm() / kWorldPerReported;
   for (std::uint32_t i = 0; i < remote.count; ++i) {
     const realtime::RemoteContactReport& contact = remote.contacts[i];
     const Vec3 proxy = reported(tick, contact.proxy_m.cast<double>());
     const Vec3 force = rotation * contact.force_N.cast<double>();
     state.contacts.values.insert(state.contacts.values.end(),
                                  {double(contact.id), proxy.x(), proxy.y(), proxy.z(), force.x(), force.y(),
-                                  force.z(), contact.depth_m * metre});
+                                  force.z(), contact.depth_m * clientTick.metre});
   }
   return state;
 }
@@ -146,11 +146,16 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   buttons(frame.buttons, touching, out);
   const bool contactEnded = touching_ && !touching;
   const bool contactChanged = touching_ != touching;
-  if (tick.time < due_ && !contactEnded) return;
-  // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
-  const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
-  due_ = std::max(due + period_, tick.time - period_ / 2);
+  const bool inBetween = tick.time < due_;
+  if (!inBetween) {
+    // The first tick begins the intervals. A later one may be early by half a servo period and still be due.
+    const base::Nanos due = due_ == 0 ? tick.time - slack_ : due_;
+    due_ = std::max(due + period_, tick.time - period_ / 2);
+  } else if (!contactChanged) {
+    return;
+  }
   now_ = tick.time;
+  const std::size_t first = out.size();
   const ClientTick clientTick = toClientTick(tick, config_.forceReport);
   tracker(clientTick, frame, out);
   if (contactEnded) {
@@ -165,6 +170,8 @@ void Reporter::update(const TickReport& tick, const ReportFrame& frame, std::vec
   if (wants(wire::kReportForce)) out.push_back({wire::IsTouching{flag(clientTick.touching)}, contactChanged});
   poses(tick, frame, out);
   tickReport(tick, clientTick, contactEnded, out);
+  // The end of the contact, which is reliable, may be next: a datagram from before could arrive after it.
+  for (std::size_t i = first; inBetween && i < out.size(); ++i) out[i].reliable = true;
 }
 
 void Reporter::skip(const TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out) {
@@ -232,9 +239,9 @@ void Reporter::buttons(std::uint32_t buttons, bool touching, std::vector<Outgoin
   }
 }
 
-bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orientation) {
+bool Reporter::moved(std::int32_t sensor, const Vec3& position, const Quat& orientation, double metre) {
   Sent& sent = sensors_[static_cast<std::size_t>(sensor)];
-  const bool far = !((position - sent.position).norm() <= config_.linearTolerance_m);
+  const bool far = !((position - sent.position).norm() <= config_.linearTolerance_m * metre);
   if (!far && config_.linearTolerance_m > 0 &&
       sent.orientation.angularDistance(orientation) <= config_.angularTolerance_rad) {
     return false;
@@ -252,7 +259,7 @@ void Reporter::tracker(const ClientTick& clientTick, const ReportFrame& frame, s
   const Quat orientation = toFrame * clientTick.orientation;
   const auto pose = [&](std::uint32_t kind, std::int32_t sensor, const Vec3& world) {
     const Vec3 position = toFrame * (world - frame.origin);
-    const bool changed = moved(sensor, position, orientation);
+    const bool changed = moved(sensor, position, orientation, clientTick.metre);
     if (!changed && !sensors_[static_cast<std::size_t>(sensor)].last.settles(now_)) return false;
     if (!wants(kind)) return changed;
     const std::int32_t number = view_ == View::device ? sensor : 0;
@@ -304,7 +311,7 @@ bool Reporter::contact(const ClientTick& clientTick, std::vector<Outgoing>& out)
   };
   const bool pushed = ended || (clientTick.force_N - force_N_).norm() > kForceStep_N;
   if (pushed) force_N_ = clientTick.force_N;
-  const bool sunk = std::abs(clientTick.depth - depth_) > kDepthStep_m;
+  const bool sunk = std::abs(clientTick.depth - depth_) > kDepthStep_m * clientTick.metre;
   if (sunk) depth_ = clientTick.depth;
   const bool other = std::exchange(object_, clientTick.object) != clientTick.object;
   bool changed = report(pushed, forceChange_, wire::Force{array(clientTick.force_N)});

@@ -82,8 +82,8 @@ class Reporter {
  public:
   Reporter(const DeviceConfig& config, int buttonCount, const ReportChoice& choice, View view = View::device);
 
-  /// Appends the reports of this tick: changes of buttons, of the guard and the end of a contact at once, the
-  /// rest once per report period.
+  /// Appends the reports of this tick: once per report period, and when a contact begins or ends. Changes of
+  /// buttons and of the guard are reported at once, too.
   void update(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
   /// The same for a tick that is too old to report: omits and counts what is due, unless contact begins or
   /// ends. The next update() reports the changes since the last report.
@@ -120,7 +120,8 @@ class Reporter {
   void poses(const realtime::TickReport& tick, const ReportFrame& frame, std::vector<Outgoing>& out);
 
   bool wants(std::uint32_t kind) const noexcept { return (choice_.kinds & kind) != 0; }
-  bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation);
+  bool moved(std::int32_t sensor, const geometry::Vec3& position, const geometry::Quat& orientation,
+             double metre);
   wire::F64x4 quaternion(const geometry::Quat& q) const;
 
   const DeviceConfig config_;

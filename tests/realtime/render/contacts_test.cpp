@@ -98,6 +98,27 @@ TEST_P(ContactsTest, touched_object_exerts_the_largest_force) {
   EXPECT_EQ(r.touchedObject, wall.object);
 }
 
+// A ball between two walls touches each at a place of its own, a radius from its centre.
+TEST_P(ContactsTest, the_touched_point_is_on_the_touched_object) {
+  constexpr double kRadius_m = 0.001;
+  addWall(surface());
+  add(plane(0.05, 7), surface());
+  start({0.003, 0.003, 0.003}, {.toolRadius_m = kRadius_m});
+  EXPECT_EQ(touchedContact(hand->now()), nullptr);
+  for (const Vec3& pressed : {Vec3(-0.001, 0.003, -0.002), Vec3(-0.002, 0.003, -0.001)}) {
+    at({0.003, 0.003, 0.003});
+    const Rendering& r = at(pressed);
+    ASSERT_EQ(r.contactCount, 2U);
+    const Contact* touched = touchedContact(r);
+    ASSERT_NE(touched, nullptr);
+    EXPECT_EQ(touched->object, r.touchedObject);
+    const bool floor = pressed.z() < pressed.x();
+    EXPECT_NEAR((touched->normal - (floor ? Vec3::UnitZ() : Vec3::UnitX())).norm(), 0, 1e-9);
+    const Vec3 point = floor ? Vec3(kRadius_m, 0.003, 0) : Vec3(0, 0.003, kRadius_m);
+    EXPECT_NEAR((touched->point_m - offset() - point).norm(), 0, 1e-6);
+  }
+}
+
 // An adhesive plane is a contact that pulls.
 TEST_P(ContactsTest, adhesion_is_a_contact) {
   scene::Plane floor;

@@ -217,28 +217,25 @@ TEST_F(ReportPass, APassOverVeryManyClientsLeavesTheLoopFree) {
 TEST_F(ReportPass, ANewClientStartsFromTheReportedState) {
   config_.reportRate_Hz = choice_.rate_Hz = 10;
   ReportGroup group(config_, 1, choice_, DeviceName{wire::LocalSender{1}});
-  const auto at = [](std::uint64_t number, bool touching) {
+  const auto at = [](std::uint64_t number, double force_N) {
     auto timed = std::make_shared<TimedTick>();
     timed->tick.tick = number;
     timed->tick.time = static_cast<Nanos>(number) * kMs;
     timed->time = {static_cast<std::uint32_t>(number), 0};
-    timed->tick.rendering.touching = touching;
-    if (touching) timed->tick.force_N = Vec3(0, 0, 1);
+    timed->tick.force_N = Vec3(0, 0, force_N);
     return timed;
   };
-  group.add(at(1000, false), false);
-  group.add(at(1001, false), false);
-  group.add(at(1010, true), false);  // not due, and over before the next report
+  group.add(at(1000, 0), false);
+  group.add(at(1001, 0), false);
+  group.add(at(1010, 1), false);  // not due, and over before the next report
   int forces = 0;
   int buttons = 0;
-  group.presentState(*at(1010, true), [&](const wire::Message& message, wire::Time time) {
+  group.presentState(*at(1010, 1), [&](const wire::Message& message, wire::Time time) {
     if (const auto* force = message.as<wire::Force>()) {
       ++forces;
       EXPECT_EQ(force->force[2], 0);
       EXPECT_EQ(time.seconds, 1000U) << "of the values";
     }
-    const auto* touching = message.as<wire::IsTouching>();
-    EXPECT_TRUE(touching == nullptr || touching->touching == 0);
     if (message.as<wire::ButtonStates>() != nullptr) {
       ++buttons;
       EXPECT_EQ(time.seconds, 1010U);

@@ -67,6 +67,12 @@ class ReporterTest : public ::testing::Test {
     rendering.normalForce_N = Vec3(0, 0, 500 * depth_m);
     tick_.force_N = rendering.normalForce_N + Vec3(0.1, 0, 0);
     rendering.scp_m = rendering.proxy_m;
+    rendering.contactCount = 1;
+    rendering.contacts[0] = {.object = 3,
+                             .triangle = 0,
+                             .point_m = rendering.proxy_m,
+                             .normal = Vec3::UnitZ(),
+                             .force_N = rendering.normalForce_N};
   }
 
   DeviceConfig config_;
@@ -139,6 +145,29 @@ TEST_F(ReporterTest, PoseIsReportedWhenItChangedByMoreThanTheTolerance) {
   EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
 }
 
+// A client may have its world in metres, or in micrometres: the same motions are reported to it.
+TEST_F(ReporterTest, TolerancesAreLengthsOfTheDevice) {
+  for (const double worldUnitsPerMetre : {1.0, 1e6}) {
+    reporter_.reset();
+    tick_.T_world_device = Affine(Eigen::UniformScaling<double>(worldUnitsPerMetre));
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3::Zero();
+    touch(0.002);
+    step();
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0009, 0, 0);
+    tick_.rendering.depth_m = 0.002009;
+    step();
+    EXPECT_TRUE(reported<wire::TrackerPosQuat>().empty());
+    EXPECT_TRUE(reported<wire::TrackerVelocity>().empty());
+    EXPECT_TRUE(reported<wire::Dop>().empty());
+    tick_.rendering.proxy_m = tick_.device.position_m = Vec3(0.0011, 0, 0);
+    tick_.rendering.depth_m = 0.002011;
+    step();
+    EXPECT_EQ(reported<wire::TrackerPosQuat>().size(), 2U);
+    EXPECT_EQ(reported<wire::TrackerVelocity>().size(), 1U);
+    EXPECT_EQ(reported<wire::Dop>().size(), 1U);
+  }
+}
+
 TEST_F(ReporterTest, ZeroToleranceMeansEveryPeriod) {
   config_.linearTolerance_m = 0;
   step();
@@ -169,6 +198,30 @@ TEST_F(ReporterTest, ContactIsReportedOnChange) {
   step();
   EXPECT_EQ(reported<wire::Force>().size(), 1U);
   EXPECT_EQ(reported<wire::Dop>().size(), 1U);
+}
+
+// Of several touched objects, the one that pushes hardest gives all: the directions in between are of none.
+TEST_F(ReporterTest, PointAndAngleAreThoseOfTheTouchedObject) {
+  touch();
+  realtime::Rendering& rendering = tick_.rendering;
+  rendering.normal = Vec3(1, 0, 1).normalized();
+  rendering.scp_m = Vec3(0.0003, 0, 0.0003);
+  rendering.contactCount = 2;
+  rendering.contacts[0] = {.object = 5,
+                           .triangle = 0,
+                           .point_m = Vec3(0, 0, 0.001),
+                           .normal = Vec3::UnitX(),
+                           .force_N = Vec3::UnitX()};
+  rendering.contacts[1] = {.object = 3,
+                           .triangle = 0,
+                           .point_m = Vec3(0.001, 0, 0),
+                           .normal = Vec3::UnitY(),
+                           .force_N = Vec3::UnitY()};
+  step();
+  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+  EXPECT_NEAR(reported<wire::Angle>().at(0).angle, 0, 1e-9);
+  EXPECT_EQ(reported<wire::Scp>().at(0).position, (wire::F64x3{0.001, 0, 0}));
+  EXPECT_EQ(reported<wire::TrackerPosQuat>().at(2).position, (wire::F64x3{0.001, 0, 0}));
 }
 
 // As a datagram it may have been lost, and nothing else would tell the client.
@@ -228,6 +281,30 @@ TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
               isReliable<wire::Angle>());
   step();
   EXPECT_TRUE(out_.empty());
+}
+
+// A touch may be shorter than a report period.
+TEST_F(ReporterTest, BeginAndEndOfAContactAreReportedBetweenTwoPeriodsAndDoNotMoveThem) {
+  config_.reportRate_Hz = 100;
+  std::vector<int> at;
+  for (int i = 0; i < 45; ++i) {
+    if (i == 13 || i == 33) touch();
+    if (i == 16 || i == 33 + 2) {
+      tick_.rendering = {};
+      tick_.force_N = Vec3::Zero();
+    }
+    step();
+    if (reported<wire::IsTouching>().empty()) continue;
+    at.push_back(i);
+    if (i == 13 || i == 33) {
+      EXPECT_EQ(reported<wire::IsTouching>()[0].touching, 1);
+      EXPECT_TRUE(isReliable<wire::IsTouching>());
+      EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, 3);
+      EXPECT_EQ(reported<wire::Angle>().at(0).touching, 1);
+      for (const Outgoing& out : out_) EXPECT_TRUE(out.reliable) << "the end may come before a datagram";
+    }
+  }
+  EXPECT_EQ(at, (std::vector<int>{0, 10, 13, 16, 20, 30, 33, 35, 40}));
 }
 
 TEST_F(ReporterTest, TheReportRateIsKeptAndButtonsAreReportedAtOnce) {
@@ -501,6 +578,22 @@ TEST_F(ReporterTest, EveryContactOfATickIsListedAndTheEndIsAnEmptyList) {
   step();
   EXPECT_TRUE(reported<wire::ContactList>().at(0).contacts.values.empty());
   EXPECT_TRUE(isReliable<wire::ContactList>());
+  step();
+  EXPECT_TRUE(out_.empty());
+}
+
+// A plane that adheres pulls after the touch, too.
+TEST_F(ReporterTest, TheEndOfATouchIsAnEmptyListAlsoWhereAPlaneStillPulls) {
+  choice_.kinds = wire::kReportContacts;
+  touch();
+  step();
+  ASSERT_EQ(reported<wire::ContactList>().size(), 1U);
+  tick_.rendering = {};
+  tick_.rendering.contactCount = 1;
+  tick_.rendering.contacts[0] = {-1, 0, Vec3::Zero(), Vec3::UnitZ(), Vec3(0, 0, -0.1)};
+  step();
+  ASSERT_EQ(reported<wire::ContactList>().size(), 1U);
+  EXPECT_TRUE(reported<wire::ContactList>().at(0).contacts.values.empty());
   step();
   EXPECT_TRUE(out_.empty());
 }
