@@ -225,14 +225,25 @@ TEST_F(Haply, OneClientPushesAtATime) {
 
 TEST_F(Haply, AStopOfAnyClientStopsItsForces) {
   HaplyClient client(port());
-  ASSERT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed).is_null());
+  const auto isReady = [](const json& frame) {
+    return frame.at("inverse3").at(0).at("status").at("ready").get<bool>();
+  };
+  const json pushed = untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed);
+  ASSERT_FALSE(pushed.is_null());
+  EXPECT_TRUE(isReady(pushed));
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::StopForces{});
   ASSERT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isFree).is_null());
-  for (int i = 0; i < 20; ++i) EXPECT_TRUE(isFree(client.forced({1, 0, 0})));
+  for (int i = 0; i < 20; ++i) {
+    const json frame = client.forced({1, 0, 0});
+    EXPECT_TRUE(isFree(frame));
+    EXPECT_FALSE(isReady(frame));
+  }
   peer.send(wire::RearmForces{});
-  EXPECT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed).is_null());
+  const json again = untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed);
+  ASSERT_FALSE(again.is_null());
+  EXPECT_TRUE(isReady(again));
 }
 
 TEST_F(Haply, RefusesPagesAndForeignNames) {
