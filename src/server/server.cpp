@@ -472,6 +472,7 @@ void Server::onClosed(Session& session, const std::string& reason) {
   if (!session.ending()) {
     for (const auto& scene : scenes_) scene->clientGone(session.id());
   }
+  nextStreamRefusal_.erase(session.id());
   admission_.leave(session);
   sessions_.erase(session.id());
   for (const auto& [station, text] : texts) sendText(*station, text);

@@ -147,6 +147,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   std::set<Station*> unfinishedReports_;  ///< with clients that a pass has not reached yet
   Markers markers_;
   scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
+  std::map<scene::ClientId, base::Nanos> nextStreamRefusal_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::LocalListener> localListener_;

@@ -195,6 +195,13 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
   if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
   if (permitted) return true;
+  // A stream has a thousand reads in a second.
+  if (message.kind == wire::kindOf<wire::HeldForce> || message.kind == wire::kindOf<wire::RemoteContacts>) {
+    Nanos& due = nextStreamRefusal_[session.id()];
+    const Nanos now = base::now();
+    if (now < due) return false;
+    due = now + 1'000'000'000;
+  }
   // Send one text for each read: a refused upload has thousands of messages.
   if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
     session.send(message.local_sender,

@@ -187,6 +187,30 @@ TEST_F(ControlTest, AClientThatTheServerEndsKeepsNeitherControlNorHand) {
   EXPECT_EQ(log.count("disconnected: malformed"), 0U) << log.text();
 }
 
+// A client that streams at 1 kHz and reads nothing would be disconnected by its own refusals.
+TEST_F(ControlTest, AStreamThatIsNotPermittedHasOneTextASecond) {
+  Config config = RunningServer::anyPort();
+  config.devices[0].control = server::Control::first;
+  serve(config);
+  auto first = peer();
+  const auto second = peer();
+  first->send(wire::SetObjectNumber{2});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 50; ++i) {
+    second->send(wire::HeldForce{.force = {1, 0, 0}, .lifetime = 0.1});
+    second->send(wire::RemoteContacts{});
+    second->send(wire::Ping{});
+    ASSERT_TRUE(second->untilNext<wire::Pong>());
+  }
+  const auto seconds =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::steady_clock::now() - begin);
+  ASSERT_FALSE(second->texts().empty());
+  EXPECT_EQ(second->texts().front().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
+  EXPECT_LE(second->texts().size(), static_cast<std::size_t>(1 + seconds.count()));
+}
+
 // A client that gets control in the middle of its batch does not get the rest of it.
 TEST_F(ControlTest, ABatchIsTakenOrRefusedAsAWhole) {
   Config config = RunningServer::anyPort();

@@ -24,10 +24,11 @@ enum RemoteStatus : std::uint32_t {
 struct RemoteRendering {
   Vec3 contactForce_N = Vec3::Zero();  ///< what all remote contacts add to the scene, before the guard
   Vec3 heldForce_N = Vec3::Zero();     ///< before the guard
-  double energy_J = 0;                 ///< left for the held force
-  std::int64_t contactsTime = 0;       ///< the client's stamp of the newest set that this tick knows
-  std::int64_t forceTime = 0;          ///< the same of the held force
-  std::uint32_t status = 0;            ///< RemoteStatus bits
+  /// Left for the held force; as long as nothing was streamed, what its tank starts with.
+  double energy_J = EnergyBudget{}.start_J;
+  std::int64_t contactsTime = 0;  ///< the client's stamp of the newest set that this tick knows
+  std::int64_t forceTime = 0;     ///< the same of the held force
+  std::uint32_t status = 0;       ///< RemoteStatus bits
   std::uint32_t count = 0;
   std::array<RemoteContactReport, kMaxRemoteContacts> contacts;
 

@@ -143,11 +143,13 @@ bool Tick::handIsLost() const noexcept {
   return !sight_.ever || report_.time - sight_.time > kOutOfSight;
 }
 
-// The renderer goes on where the hand was last seen, and no contact is reported.
+// The renderer goes on where the hand was last seen, and no contact is reported. The tank keeps what it has.
 void Tick::feelNothing() noexcept {
   report_.rendering = Rendering{};
   report_.rendering.proxy_m = report_.rendering.scp_m = report_.device.position_m;
+  const double energy_J = report_.remote.energy_J;
   report_.remote = RemoteRendering{};
+  report_.remote.energy_J = energy_J;
 }
 
 // What a client streams belongs to the world: a view that moved takes it along on the device. A view that

@@ -41,7 +41,7 @@ Json arm(const ShownDevice& shown, bool config) {
              {{"calibrated", (state.hold & device::kHoldNotCalibrated) == 0},
               {"in_use", shown.inUse},
               {"power_supply", true},
-              {"ready", works(state) && !shown.off},
+              {"ready", works(state) && !shown.isOff},
               {"started", true}}}};
   if (config) {
     json["config"] = {{"type", "inverse3"},

@@ -22,7 +22,7 @@ struct ShownDevice {
   device::DeviceState state;
   Vec3 force_N = Vec3::Zero();  ///< as written to the device
   bool inUse = false;           ///< a client's force is held
-  bool off = false;             ///< forces are stopped, latched or not enabled
+  bool isOff = false;           ///< forces are stopped, not enabled, or off for a fault until a re-arm
 };
 
 /// One state frame. `config`: with what only the first frame of a connection carries.

@@ -154,8 +154,9 @@ std::string HaplyPort::frame(const Client& client, bool config) const {
   std::vector<haply::ShownDevice> shown;
   for (const auto& station : stations_) {
     const realtime::TickReport& last = station->lastTick();
-    const bool off = last.guard.stopped || last.guard.latched != 0 || !last.guard.armed;
-    shown.push_back({station->name(), last.device, last.force_N, !last.remote.heldForce_N.isZero(0), off});
+    const realtime::GuardReport& guard = last.guard;
+    shown.push_back({station->name(), last.device, last.force_N, !last.remote.heldForce_N.isZero(0),
+                     guard.stopped || !guard.armed || guard.latched != 0});
   }
   return haply::stateFrame(client.who.id, shown, config);
 }

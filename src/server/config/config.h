@@ -11,14 +11,16 @@
 #include <utility>
 #include <vector>
 
+#include "base/printable.h"
 #include "scene/config.h"
 
 namespace hapticd::server {
 
-/// Invalid configuration; the text names file, line, key, value and remedy.
+/// Invalid configuration; the text names file, line, key, value and remedy, in one line whatever the values
+/// are.
 class ConfigError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit ConfigError(const std::string& text) : std::runtime_error(base::printable(text)) {}
 };
 
 /// An invalid value. Names its key, so that the reader of a file can add file and line.

@@ -8,10 +8,12 @@
 #include <map>
 #include <sstream>
 
+#include "base/printable.h"
 #include "device/drivers/drivers.h"
 #include "net/endpoint.h"
 #include "net/local_socket.h"
 #include "server/config/config.h"
+#include "wire/names.h"
 #include "wire/text.h"
 
 namespace hapticd::server {
@@ -52,16 +54,18 @@ class Checker {
 
 void checkName(std::size_t device, const std::string& name, std::map<std::string, int>& uses) {
   const auto fail = [&](const std::string& text) { throw InvalidValue(device, "names", text); };
-  // VRPN's receivers refuse longer descriptions, and its clients split NAME@HOST at the '@'.
-  const bool plain = std::none_of(name.begin(), name.end(), [](char c) {
-    return c == '@' || c == 0x7f || static_cast<unsigned char>(c) < 0x20;
-  });
-  if (name.empty() || name.size() > 95 || !plain) {
+  // VRPN's receivers refuse longer descriptions, and its clients split NAME@HOST at the '@'. Names of VRPN
+  // are bytes: they need not be UTF-8.
+  const bool plain = name.find('@') == std::string::npos && base::printable(name) == base::utf8(name);
+  if (name.empty() || name.size() > wire::kMaxNameBytes || !plain) {
     fail("device name " + wire::inQuotes(name) +
-         " must have 1 to 95 characters, no '@' and no control characters");
+         " must have 1 to 95 bytes, no '@' and no control characters");
   }
   if (name == "VRPN Control") fail("the name 'VRPN Control' is reserved by VRPN");
   if (++uses[name] > 1) fail("the name '" + name + "' is used twice; device names must be unique");
+  constexpr std::size_t kMost = wire::kMaxNames - 1;  // beside VRPN Control
+  if (uses.size() > kMost)
+    fail(fmt::format("the name '{}' is one too many: VRPN has numbers for {}, with mirrors", name, kMost));
 }
 
 void checkDriver(const Checker& check, const DeviceConfig& device) {

@@ -581,6 +581,28 @@ TEST_F(LostHandTest, RemoteContactsStatedBeforeDoNotPullItBack) {
   for (int i = 0; i < 60; ++i) EXPECT_EQ(state(-0.15), 0) << i;
 }
 
+TEST_F(LostHandTest, TheEnergyForHeldForcesIsToldBeforeTheFirstOneAndWhileItIsLost) {
+  tick.snapshots().publish(fixture::SceneFixture().snapshot());
+  put(0);
+  run(10 * kMs);
+  EXPECT_EQ(tick.last().remote.energy_J, 0.020) << "what a new tank has";
+  RemoteInput input;
+  input.force.number = 1;
+  input.force.received = now_;
+  input.force.lifetime = 10'000 * kMs;
+  input.force.force_N = Vec3(0, 0, -1);
+  tick.remote().write(input);
+  for (int i = 0; i < 20; ++i) {
+    device.state.position_m.z() += 0.5e-3;
+    device.state.velocity_m_per_s = Vec3(0, 0, 0.5);
+    run(kMs);
+  }
+  const double left_J = tick.last().remote.energy_J;
+  EXPECT_GT(left_J, 0.0205) << "the hand put something in";
+  lose();
+  EXPECT_GE(tick.last().remote.energy_J, left_J);
+}
+
 TEST_F(LostHandTest, HeldForcesDoNotAddUpBeforeItsFirstState) {
   device.gives = false;
   RemoteInput input;

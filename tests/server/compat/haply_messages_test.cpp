@@ -70,6 +70,11 @@ TEST(HaplyFrame, ADeviceThatTakesNoForceIsNotReady) {
   status = json::parse(stateFrame(1, {device}, false))["inverse3"][0]["status"];
   EXPECT_EQ(status["calibrated"], true);
   EXPECT_EQ(status["ready"], false);
+  device.state.hold = device::kHoldNone;
+  device.isOff = true;
+  const json frame = json::parse(stateFrame(1, {device}, false));
+  EXPECT_EQ(frame["inverse3"][0]["status"]["ready"], false);
+  EXPECT_EQ(frame["wireless_verse_grip"][0]["status"]["ready"], true) << "it needs no force";
 }
 
 TEST(HaplyCommands, ReadBothFormsOfAForce) {

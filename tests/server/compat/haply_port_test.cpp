@@ -225,7 +225,12 @@ TEST_F(Haply, OneClientPushesAtATime) {
 
 TEST_F(Haply, AStopOfAnyClientStopsItsForces) {
   HaplyClient client(port());
-  ASSERT_FALSE(untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed).is_null());
+  const auto isReady = [](const json& frame) {
+    return frame.at("inverse3").at(0).at("status").at("ready").get<bool>();
+  };
+  const json pushed = untilFrame([&] { return client.forced({1, 0, 0}); }, isPushed);
+  ASSERT_FALSE(pushed.is_null());
+  EXPECT_TRUE(isReady(pushed));
   ScriptedPeer peer(server_.address());
   ASSERT_TRUE(peer.untilConnected());
   peer.send(wire::StopForces{});

@@ -127,9 +127,8 @@ TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
             "test.toml:2: device 'Phantom': report_rate_Hz must be between 0.1 and 1000, got 2000");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A\"\n[[device]]\nname=\"A\""),
             "test.toml:4: the name 'A' is used twice; device names must be unique");
-  EXPECT_EQ(
-      errorOf("[[device]]\nname=\"A@B\""),
-      "test.toml:2: device name \"A@B\" must have 1 to 95 characters, no '@' and no control characters");
+  EXPECT_EQ(errorOf("[[device]]\nname=\"A@B\""),
+            "test.toml:2: device name \"A@B\" must have 1 to 95 bytes, no '@' and no control characters");
   EXPECT_EQ(errorOf("[[device]]\nworkspace=[1,2,3]"),
             "test.toml:2: device 'Phantom': workspace needs six numbers in mm: min x y z, then max x y z, "
             "each min below its max");
@@ -203,6 +202,49 @@ TEST(Config, ErrorsOfControlNameTheRemedy) {
       "test.toml:3: device 'Phantom': control_list: \"10.0.0.5:80\" is not an IPv4 address such as 10.0.0.5");
   EXPECT_EQ(errorOf("[[device]]\ncontrol=\"nobody\""),
             "test.toml:2: 'control' is 'nobody', expected \"any\" or \"first\" or \"list\"");
+}
+
+TEST(Config, NamesHaveNoControlCharactersAndAreCountedInBytes) {
+  const auto named = [](const std::string& name) { return errorOf("[[device]]\nname=\"" + name + "\""); };
+  const std::string refusal = " must have 1 to 95 bytes, no '@' and no control characters";
+  EXPECT_THAT(named("a\\tb"), HasSubstr(refusal));
+  EXPECT_THAT(named("a\\u007fb"), HasSubstr(refusal));
+  EXPECT_THAT(named("a\\u0085b"), HasSubstr(refusal)) << "a new line to many programs that read the log";
+  EXPECT_THAT(named("a\\u009b2Jb"), HasSubstr(refusal)) << "a command to terminals";
+  EXPECT_EQ(named("a\\u00a0b"), "");
+  EXPECT_THAT(named(std::string(96, 'a')), HasSubstr(refusal));
+  EXPECT_EQ(named(std::string(95, 'a')), "");
+  std::string letters;
+  for (int i = 0; i < 48; ++i) letters += "ä";
+  EXPECT_THAT(named(letters), HasSubstr(refusal)) << "48 letters of 2 bytes";
+  EXPECT_EQ(named(letters.substr(2)), "");
+  ServerConfig config;
+  config.devices.front().names = {"B\xf6hm"};
+  EXPECT_NO_THROW(validate(config)) << "names of VRPN need not be UTF-8";
+}
+
+TEST(Config, NamesBeyondTheNumbersOfVrpnAreRefused) {
+  ServerConfig config;
+  std::vector<std::string>& names = config.devices.front().names;
+  names.clear();
+  for (int i = 0; i < 1999; ++i) names.push_back("N" + std::to_string(i));
+  EXPECT_NO_THROW(validate(config));
+  names.emplace_back("N1999");
+  EXPECT_THROW(validate(config), InvalidValue);
+  names.resize(500);
+  config.devices.front().mirrors = true;
+  EXPECT_THROW(validate(config), InvalidValue) << "four names each";
+  names.resize(499);
+  EXPECT_NO_THROW(validate(config));
+}
+
+TEST(Config, AnErrorIsOneLineWhateverTheValueIs) {
+  for (const char* text : {"\"a\\nb\" = 1", "[[device]]\ndriver = \"a\\nb\"",
+                           "[[device]]\nname = \"A\"\nscene = \"a\\nb\"\ncontrol = \"first\"\n"
+                           "[[device]]\nname = \"B\"\nscene = \"a\\nb\""}) {
+    EXPECT_THAT(errorOf(text), HasSubstr("a\xef\xbf\xbd"
+                                         "b"));
+  }
 }
 
 TEST(Config, DevicesOfOneSceneMustAgreeOnSceneOnDisconnect) {

@@ -115,7 +115,7 @@ TEST(VrpnCfg, ErrorsNameTheLine) {
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P 1 60 X\nvrpn_Phantom P 1 60 Y"),
             "vrpn.cfg:2: the name 'P' is used twice; device names must be unique");
   EXPECT_EQ(vrpnCfgError("vrpn_Phantom P@Q 1 60 X"),
-            "vrpn.cfg:1: device name \"P@Q\" must have 1 to 95 characters, no '@' and no control characters");
+            "vrpn.cfg:1: device name \"P@Q\" must have 1 to 95 bytes, no '@' and no control characters");
 }
 
 TEST(VrpnCfg, AFileWithoutSupportedDevicesIsAnError) {
