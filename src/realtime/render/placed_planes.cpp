@@ -229,8 +229,9 @@ void PlacedPlanes::resume(const RenderMemory& memory) noexcept {
   }
 }
 
-Vec3 PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
-  Vec3 force = Vec3::Zero();
+Adhesion PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
+  Adhesion adhesion;
+  double hardest_N = 0;
   for (int i = 0; i < count_; ++i) {
     const PlacedPlane& plane = (*this)[i];
     for (int k = 0; k < memoryCount_; ++k) {
@@ -242,11 +243,14 @@ Vec3 PlacedPlanes::adhesion(const Vec3& hip, double toolRadius_m) noexcept {
         memory.adheres = false;
         memory.touched = memory.belowCrest;
       } else {
-        force -= plane.share * pull * plane.facet.normal;
+        adhesion.force_N -= plane.share * pull * plane.facet.normal;
+        if (plane.share * pull <= hardest_N) continue;
+        hardest_N = plane.share * pull;
+        adhesion.point_m = hip - (height + toolRadius_m) * plane.facet.normal;
       }
     }
   }
-  return force;
+  return adhesion;
 }
 
 }  // namespace hapticd::realtime

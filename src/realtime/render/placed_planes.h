@@ -29,6 +29,12 @@ struct PlacedPlane {
   double share = 1;
 };
 
+/// With which planes hold a HIP that leaves them, device frame.
+struct Adhesion {
+  Vec3 force_N = Vec3::Zero();
+  Vec3 point_m = Vec3::Zero();  ///< on the plane that pulls hardest
+};
+
 /// All planes, with their state from tick to tick. Servo thread: noexcept, no allocation.
 class PlacedPlanes {
  public:
@@ -59,8 +65,8 @@ class PlacedPlanes {
     facet.a -= depth_m * facet.normal;
   }
 
-  /// Adhesive force on a HIP that leaves, device frame, newtons. A plane whose limit is exceeded lets go.
-  Vec3 adhesion(const Vec3& hip, double toolRadius_m) noexcept;
+  /// A plane whose limit is exceeded lets go.
+  Adhesion adhesion(const Vec3& hip, double toolRadius_m) noexcept;
 
  private:
   struct Memory {

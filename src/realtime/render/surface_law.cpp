@@ -213,13 +213,14 @@ bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, d
          2 * stiffness_N_per_m * toolRadius_m > limit;
 }
 
-void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept {
+void applyAdhesion(const Adhesion& adhesion, Rendering& out) noexcept {
+  const Vec3& force_N = adhesion.force_N;
   if (force_N.isZero(0)) return;
   out.contactForce_N += force_N;
   Contact& contact = contactWith(-1, out);
   if (contact.normal.isZero(0)) {
     contact.normal = -force_N.normalized();
-    contact.point_m = out.proxy_m;
+    contact.point_m = adhesion.point_m;
   }
   contact.force_N += force_N;
 }

@@ -16,6 +16,6 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
 bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, double toolRadius_m) noexcept;
 
 /// Adds the adhesive force of planes. Call it after applySurfaceLaw().
-void applyAdhesion(const Vec3& force_N, Rendering& out) noexcept;
+void applyAdhesion(const Adhesion& adhesion, Rendering& out) noexcept;
 
 }  // namespace hapticd::realtime

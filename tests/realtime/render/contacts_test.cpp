@@ -133,6 +133,7 @@ TEST_P(ContactsTest, adhesion_is_a_contact) {
   ASSERT_EQ(r.contactCount, 1U);
   EXPECT_EQ(r.contacts[0].object, -1);
   EXPECT_NEAR((r.contacts[0].force_N - Vec3(0, 0, -0.4)).norm(), 0, 1e-4);
+  EXPECT_NEAR((r.contacts[0].point_m - offset()).norm(), 0, 1e-6) << "on the plane, 0.4 mm below the hand";
   EXPECT_NEAR((r.contacts[0].normal - Vec3::UnitZ()).norm(), 0, 1e-9);
   expectSum(r);
   EXPECT_EQ(to({0, 0, 0.001}).contactCount, 0U);
