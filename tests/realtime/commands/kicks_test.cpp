@@ -428,8 +428,10 @@ TEST(FrictionEffect, begins_without_a_force_wherever_the_hand_is) {
   for (const auto& before : {define("viscous", 0.001), define("friction", 0)}) {
     Loop loop;
     loop.rest(Vec3(0, 0.010, 0), 20 * kMs);
-    loop.send(before);
+    loop.send(define("friction", 0.5));
     loop.send(scene::StartEffect{0});
+    loop.rest(Vec3(0, 0.010, 0), 20 * kMs);
+    loop.send(before);
     loop.rest(Vec3(0, 0.010, 0), 50 * kMs);
     loop.to(far);
     loop.rest(far, 50 * kMs);
