@@ -266,19 +266,24 @@ TEST_F(ReporterTest, TheTransitionToZeroForceIsReported) {
   EXPECT_TRUE(reported<wire::Force>().empty());
 }
 
+// Long before the next report period, and when it is due.
 TEST_F(ReporterTest, TheEndOfAContactIsReliableAndComplete) {
-  config_.reportRate_Hz = 10;
-  touch();
-  step();
-  tick_.rendering = {};
-  tick_.force_N = Vec3::Zero();
-  step();  // long before the next report period
-  EXPECT_EQ(reported<wire::Force>().at(0).force, (wire::F64x3{0, 0, 0}));
-  EXPECT_EQ(reported<wire::Dop>().at(0).depth, 0);
-  EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, -1);
-  EXPECT_EQ(reported<wire::Angle>().at(0).touching, 0);
-  EXPECT_TRUE(isReliable<wire::Force>() && isReliable<wire::Dop>() && isReliable<wire::TouchedObject>() &&
-              isReliable<wire::Angle>());
+  for (const double rate_Hz : {1000, 10}) {
+    reporter_.reset();
+    config_.reportRate_Hz = rate_Hz;
+    touch();
+    step();
+    tick_.rendering = {};
+    tick_.force_N = Vec3::Zero();
+    step();
+    EXPECT_EQ(reported<wire::Force>().at(0).force, (wire::F64x3{0, 0, 0}));
+    EXPECT_EQ(reported<wire::Dop>().at(0).depth, 0);
+    EXPECT_EQ(reported<wire::TouchedObject>().at(0).object, -1);
+    EXPECT_EQ(reported<wire::Angle>().at(0).touching, 0);
+    EXPECT_TRUE(isReliable<wire::Force>() && isReliable<wire::Dop>() && isReliable<wire::TouchedObject>() &&
+                isReliable<wire::Angle>())
+        << rate_Hz;
+  }
   step();
   EXPECT_TRUE(out_.empty());
 }
