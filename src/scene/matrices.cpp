@@ -2,8 +2,8 @@
 
 #include <cmath>
 #include <limits>
-#include <sstream>
-#include <utility>
+
+#include "scene/notice.h"
 
 namespace hapticd::scene {
 
@@ -28,32 +28,31 @@ bool isInvertible(const Affine& t) {
   return std::abs((t.linear() / size).determinant()) > 1e-15;
 }
 
-std::optional<Affine> affineFrom(const Mat4& m) {
-  const double w = m(3, 3);
-  if (!m.allFinite() || w == 0) return std::nullopt;
-  if (m.row(3).head<3>().cwiseAbs().maxCoeff() > 1e-9 * std::abs(w)) return std::nullopt;
-  Affine t;
-  t.matrix() = m.topRows<3>() / w;
-  if (!isInvertible(t)) return std::nullopt;
-  return t;
-}
-
-std::string flawOf(const Mat4& m) {
-  std::ostringstream flaw;
+std::string unusableNumberOf(const Mat4& m) {
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) {
-      if (isUsable(m(row, column))) continue;
-      flaw << "row " << row + 1 << ", column " << column + 1 << " is " << m(row, column);
-      return std::move(flaw).str();
+      if (!isUsable(m(row, column)))
+        return textOf("row ", row + 1, ", column ", column + 1, " is ", m(row, column));
     }
   }
+  return {};
+}
+
+std::optional<Affine> affineFrom(const Mat4& m, std::string& flaw) {
+  flaw = unusableNumberOf(m);
+  if (!m.allFinite()) return std::nullopt;
   const double w = m(3, 3);
   if (w == 0 || m.row(3).head<3>().cwiseAbs().maxCoeff() > 1e-9 * std::abs(w)) {
-    flaw << "last row " << m.row(3);
-  } else {
-    flaw << "determinant " << m.topLeftCorner<3, 3>().determinant();
+    if (flaw.empty()) flaw = textOf("last row ", m.row(3));
+    return std::nullopt;
   }
-  return std::move(flaw).str();
+  Affine t;
+  t.matrix() = m.topRows<3>() / w;
+  if (!isInvertible(t)) {
+    if (flaw.empty()) flaw = textOf("determinant ", m.topLeftCorner<3, 3>().determinant());
+    return std::nullopt;
+  }
+  return t;
 }
 
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad) {

@@ -38,11 +38,13 @@ Mat4 fromRows(const std::array<float, 16>& m);
 /// Usable numbers, and far enough from singular to be inverted.
 bool isInvertible(const Affine& t);
 
-/// The affine map a 4x4 matrix stands for; nothing when it is projective, singular or not finite.
-std::optional<Affine> affineFrom(const Mat4& m);
-/// The values that make a matrix unusable, for a text to its sender: a number, its last row or its
-/// determinant.
-std::string flawOf(const Mat4& m);
+/// The first number that is not finite or too large, and its place, for a text to the sender; empty without
+/// one.
+std::string unusableNumberOf(const Mat4& m);
+
+/// The affine map a 4x4 matrix stands for; nothing when it is projective, singular or not finite. `flaw` is
+/// then what makes it so, for a text to its sender: a number, the last row or the determinant.
+std::optional<Affine> affineFrom(const Mat4& m, std::string& flaw);
 
 /// Rotation about an axis of any length; nothing when there is no axis although there is an angle.
 std::optional<geometry::Quat> rotationFrom(const Vec3& axis, double angle_rad);

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace hapticd::scene {
 
@@ -17,6 +19,14 @@ struct Notice {
   Severity severity = Severity::warning;
   std::string text;
 };
+
+/// The parts of a text, one after the other.
+template <class... Parts>
+std::string textOf(const Parts&... parts) {
+  std::ostringstream text;
+  static_cast<void>((text << ... << parts));
+  return std::move(text).str();
+}
 
 /// In the text of what was refused for want of memory, and not for what the client sent.
 inline constexpr std::string_view kOutOfMemory = "the server is out of memory";

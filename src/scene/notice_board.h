@@ -3,7 +3,6 @@
 
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,13 +68,7 @@ struct Call {
   template <class... Parts>
   void send(Notice::Severity severity, std::string_view name, std::string_view reason,
             const Parts&... parts) const {
-    std::ostringstream text;
-    text << name;
-    static_cast<void>((text << ... << parts));
-    text << ": " << reason;
-    std::string kind;
-    kind.append(name).append(1, '/').append(reason);
-    post(severity, std::move(kind), std::move(text).str());
+    post(severity, textOf(name, '/', reason), textOf(name, parts..., ": ", reason));
   }
 };
 

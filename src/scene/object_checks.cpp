@@ -1,7 +1,6 @@
 #include "scene/object_checks.h"
 
 #include <algorithm>
-#include <sstream>
 
 #include "geometry/gap_tolerance.h"
 #include "geometry/mesh_check.h"
@@ -29,12 +28,10 @@ std::string describeCoarseFloats(const std::vector<Vec3f>& vertices, double metr
   for (const Vec3f& v : vertices) largest = std::max(largest, static_cast<double>(v.cwiseAbs().maxCoeff()));
   const double tolerance_m = geometry::fourFloatSteps(largest) * metresPerUnit;
   if (!(tolerance_m > geometry::kLargestGapTolerance_m)) return {};
-  std::ostringstream text;
-  text << "Coordinates are as large as " << largest << ", where four steps of a float are "
-       << tolerance_m * 1e6 << " um of the device: a hand may slip through seams with gaps above "
-       << geometry::kLargestGapTolerance_m * 1e6
-       << " um. Send vertices near the origin of their object, and place the object by its position.";
-  return text.str();
+  return textOf("Coordinates are as large as ", largest, ", where four steps of a float are ",
+                tolerance_m * 1e6, " um of the device: a hand may slip through seams with gaps above ",
+                geometry::kLargestGapTolerance_m * 1e6,
+                " um. Send vertices near the origin of their object, and place the object by its position.");
 }
 
 }  // namespace

@@ -231,9 +231,10 @@ void ObjectTable::handle(TransformMesh& c, const Call& call) {
   constexpr std::string_view kName = "transformTrimesh";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
-  const std::optional<Affine> t = affineFrom(fromRows(c.matrix));
+  std::string flaw;
+  const std::optional<Affine> t = affineFrom(fromRows(c.matrix), flaw);
   if (!t) {
-    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flawOf(fromRows(c.matrix)));
+    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flaw);
     return;
   }
   becomeStock(*object);
@@ -305,9 +306,10 @@ void ObjectTable::handle(SetTransform& c, const Call& call) {
   constexpr std::string_view kName = "setTransformMatrix";
   Object* object = find(c.object, kName, call);
   if (object == nullptr) return;
-  const std::optional<Affine> t = affineFrom(fromColumns(c.matrix));
+  std::string flaw;
+  const std::optional<Affine> t = affineFrom(fromColumns(c.matrix), flaw);
   if (!t) {
-    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flawOf(fromColumns(c.matrix)));
+    call.refuse(kName, kBadMatrix, " object ", c.object, ", ", flaw);
     return;
   }
   object->asked.keep(c, call.client);

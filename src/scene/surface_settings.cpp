@@ -15,12 +15,6 @@ constexpr double kStockStiffness_N_per_m = 1000;
 constexpr double kStockDamping_Ns_per_m = 1000;
 constexpr double kStockMaxDamping = 0.005;
 
-std::string number(double value) {
-  std::ostringstream text;
-  text << value;
-  return std::move(text).str();
-}
-
 // Floats that a client meant as the limit are the limit.
 constexpr double kRounding = 1e-6;
 
@@ -114,8 +108,8 @@ Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remar
   Surface surface = asked_;
   if (surface.dynamicFriction > surface.staticFriction) {
     if (staticGiven_) {
-      remark += "dynamic friction " + number(surface.dynamicFriction) + " is above static friction " +
-                number(surface.staticFriction) + " and is lowered to it; ";
+      remark += "dynamic friction " + textOf(surface.dynamicFriction) + " is above static friction " +
+                textOf(surface.staticFriction) + " and is lowered to it; ";
     }
     surface.dynamicFriction = surface.staticFriction;
   }
@@ -144,17 +138,17 @@ std::optional<Surface> surfaceFromStock(double stiffness, double damping, double
 
 void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark) {
   if (const double max = bound.maxStiffness_N_per_m(); surface.stiffness_N_per_m > max) {
-    remark += "stiffness " + number(surface.stiffness_N_per_m) +
+    remark += "stiffness " + textOf(surface.stiffness_N_per_m) +
               " N/m would be unstable on this device and is "
               "lowered to " +
-              number(max) + "; ";
+              textOf(max) + "; ";
     surface.stiffness_N_per_m = max;
   }
   const double max = std::max(0.0, bound.maxDamping_Ns_per_m(surface.stiffness_N_per_m));
   if (surface.damping_Ns_per_m > max) {
-    remark += "damping " + number(surface.damping_Ns_per_m) + " N s/m beside stiffness " +
-              number(surface.stiffness_N_per_m) + " N/m would be unstable on this device and is lowered to " +
-              number(max) + "; ";
+    remark += "damping " + textOf(surface.damping_Ns_per_m) + " N s/m beside stiffness " +
+              textOf(surface.stiffness_N_per_m) + " N/m would be unstable on this device and is lowered to " +
+              textOf(max) + "; ";
     surface.damping_Ns_per_m = max;
   }
 }

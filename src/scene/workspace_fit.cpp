@@ -2,10 +2,10 @@
 
 #include <Eigen/SVD>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "scene/matrices.h"
+#include "scene/notice.h"
 
 namespace hapticd::scene {
 namespace {
@@ -26,13 +26,6 @@ Mat3 nearestSimilarity(const Mat3& m) {
 
 // Clients keep their matrices in floats: what those lose is not worth a word.
 constexpr double kSimilarityTolerance = 1e-5;
-
-template <class... Parts>
-std::string textOf(const Parts&... parts) {
-  std::ostringstream text;
-  static_cast<void>((text << ... << parts));
-  return std::move(text).str();
-}
 
 FittedWorkspace refused(const char* why, std::string values) {
   FittedWorkspace result;
@@ -77,23 +70,23 @@ Vec3 corner(int i, const Vec3& min, const Vec3& max) {
           (i & 4) != 0 ? max.z() : min.z()};
 }
 
-FittedWorkspace badModel(const Mat4& model) {
-  return refused("the model matrix is not finite, singular, or not affine",
-                 " model matrix: " + flawOf(model));
+FittedWorkspace badModel(const std::string& flaw) {
+  return refused("the model matrix is not finite, singular, or not affine", " model matrix: " + flaw);
 }
 
 }  // namespace
 
 FittedWorkspace fitProjection(const std::array<double, 16>& model, const std::array<double, 16>& projection,
                               const Box& device_m, WorkspaceFit fit) {
-  const std::optional<Affine> T_view_world = affineFrom(fromColumns(model));
-  if (!T_view_world) return badModel(fromColumns(model));
+  std::string flaw;
+  const std::optional<Affine> T_view_world = affineFrom(fromColumns(model), flaw);
+  if (!T_view_world) return badModel(flaw);
   const Mat4 T_clip_view = fromColumns(projection);
   const Eigen::FullPivLU<Mat4> lu(T_clip_view);
   if (!T_clip_view.allFinite() || !lu.isInvertible()) {
     return refused("the projection matrix is not finite or singular",
                    T_clip_view.allFinite() ? textOf(" determinant ", T_clip_view.determinant())
-                                           : " projection matrix: " + flawOf(T_clip_view));
+                                           : " projection matrix: " + unusableNumberOf(T_clip_view));
   }
   const Mat4 T_view_clip = lu.inverse();
   Box view;
@@ -111,8 +104,9 @@ FittedWorkspace fitProjection(const std::array<double, 16>& model, const std::ar
 
 FittedWorkspace fitBox(const std::array<double, 16>& model, const std::array<double, 6>& box,
                        const Box& device_m, WorkspaceFit fit) {
-  const std::optional<Affine> T_view_world = affineFrom(fromColumns(model));
-  if (!T_view_world) return badModel(fromColumns(model));
+  std::string flaw;
+  const std::optional<Affine> T_view_world = affineFrom(fromColumns(model), flaw);
+  if (!T_view_world) return badModel(flaw);
   const Vec3 min(box[0], box[1], box[2]);
   const Vec3 max(box[3], box[4], box[5]);
   if (!min.allFinite() || !max.allFinite()) {

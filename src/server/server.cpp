@@ -472,7 +472,7 @@ void Server::onClosed(Session& session, const std::string& reason) {
   if (!session.ending()) {
     for (const auto& scene : scenes_) scene->clientGone(session.id());
   }
-  nextStreamRefusal_.erase(session.id());
+  refusals_.erase(session.id());
   admission_.leave(session);
   sessions_.erase(session.id());
   for (const auto& [station, text] : texts) sendText(*station, text);
@@ -586,7 +586,6 @@ void Server::onReadSlice() {
 }
 
 void Server::onReadEnd(Session& session) {
-  refusalSentTo_ = 0;
   for (const auto& scene : scenes_) {
     scene->flush(session.id());
     if (scene->full(session.id())) session.hold();

@@ -146,8 +146,13 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   Admission admission_{config_.limits, sessions_};
   std::set<Station*> unfinishedReports_;  ///< with clients that a pass has not reached yet
   Markers markers_;
-  scene::ClientId refusalSentTo_ = 0;  ///< client already notified of a refusal during this read; 0: none
-  std::map<scene::ClientId, base::Nanos> nextStreamRefusal_;
+  /// What a client heard last about a kind of message to a device that it may not send, and until when it
+  /// does not hear it again.
+  struct Refusal {
+    std::string reason;
+    base::Nanos until = 0;
+  };
+  std::map<scene::ClientId, std::map<std::pair<wire::LocalSender, wire::MessageKind>, Refusal>> refusals_;
   std::vector<net::Subscription> subscriptions_;
   std::unique_ptr<net::TcpListener> listener_;
   std::unique_ptr<net::LocalListener> localListener_;

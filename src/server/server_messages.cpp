@@ -12,6 +12,8 @@ namespace hapticd::server {
 
 using base::Nanos;
 
+constexpr Nanos kRefusalPeriod = 1'000'000'000;
+
 // Dispatch by role: control messages never wait for the scene.
 void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
   Station* station = stationOf(message.local_sender);
@@ -195,20 +197,15 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
   if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
   if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
   if (permitted) return true;
-  // A stream has a thousand reads in a second.
-  if (message.kind == wire::kindOf<wire::HeldForce> || message.kind == wire::kindOf<wire::RemoteContacts>) {
-    Nanos& due = nextStreamRefusal_[session.id()];
-    const Nanos now = base::now();
-    if (now < due) return false;
-    due = now + 1'000'000'000;
-  }
-  // Send one text for each read: a refused upload has thousands of messages.
-  if (std::exchange(refusalSentTo_, session.id()) != session.id()) {
-    session.send(message.local_sender,
-                 wire::Text{.severity = wire::kTextError,
-                            .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
-                            .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
-  }
+  // A refused upload has thousands of messages, a stream a thousand in each second.
+  Refusal& refusal = refusals_[session.id()][{message.local_sender, message.kind}];
+  const Nanos now = base::now();
+  if (now < refusal.until && refusal.reason == reason) return false;
+  refusal = {reason, now + kRefusalPeriod};
+  session.send(message.local_sender,
+               wire::Text{.severity = wire::kTextError,
+                          .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
+                          .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
   return false;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/dist_sink.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -12,13 +13,18 @@
 
 namespace hapticd::test {
 
-/// Construct it before the server.
+/// Where the log of a test program goes. Threads may log while it changes; spdlog's default logger may not be
+/// exchanged beside them, so it is set once, before main().
+inline const std::shared_ptr<spdlog::sinks::dist_sink_mt> kLogSinks = [] {
+  auto sinks = std::make_shared<spdlog::sinks::dist_sink_mt>(spdlog::default_logger()->sinks());
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", sinks));
+  return sinks;
+}();
+
 class LogLines {
  public:
-  LogLines() : sink_(std::make_shared<Sink>()), before_(spdlog::default_logger()) {
-    spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", sink_));
-  }
-  ~LogLines() { spdlog::set_default_logger(before_); }
+  LogLines() { kLogSinks->set_sinks({sink_}); }
+  ~LogLines() { kLogSinks->set_sinks(before_); }
   LogLines(const LogLines&) = delete;
   LogLines& operator=(const LogLines&) = delete;
 
@@ -55,8 +61,8 @@ class LogLines {
     std::vector<std::string> lines_;
   };
 
-  std::shared_ptr<Sink> sink_;
-  std::shared_ptr<spdlog::logger> before_;
+  const std::shared_ptr<Sink> sink_ = std::make_shared<Sink>();
+  const std::vector<spdlog::sink_ptr> before_ = kLogSinks->sinks();
 };
 
 }  // namespace hapticd::test
