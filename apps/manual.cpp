@@ -136,27 +136,37 @@ std::string bashCompletion(const CLI::App& app) {
          "complete -o filenames -F _hapticd hapticd\n";
 }
 
-// The first line, for single quotes, without those of `special`.
-std::string plain(const std::string& text, std::string_view special) {
+// The first line, within single quotes that other ones end with `apostrophe`; a backslash before each of
+// `special`.
+std::string quoted(const std::string& text, std::string_view apostrophe, std::string_view special) {
   std::string out;
   for (const char c : linesOf(text).empty() ? std::string() : linesOf(text).front()) {
-    if (special.find(c) == std::string_view::npos) out += c;
+    if (c == '\'') {
+      out += apostrophe;
+    } else {
+      if (special.find(c) != std::string_view::npos) out += '\\';
+      out += c;
+    }
   }
   return out;
 }
-constexpr std::string_view kOfZsh = "'[]:";
-constexpr std::string_view kOfFish = "'\\";
+std::string zshQuoted(const std::string& text, std::string_view special) {
+  return quoted(text, R"('\'')", special);
+}
+std::string fishQuoted(const std::string& text) {
+  return quoted(text, R"(\')", "\\");
+}
 
 std::string zshCompletion(const CLI::App& app) {
   std::string text = "#compdef hapticd\nlocal -a commands\ncommands=(\n";
   for (const CLI::App* command : commandsOf(app))
-    text += "  '" + command->get_name() + ":" + plain(command->get_description(), kOfZsh) + "'\n";
+    text += "  '" + command->get_name() + ":" + zshQuoted(command->get_description(), ":\\") + "'\n";
   text += ")\nif (( CURRENT == 2 )); then\n  _describe command commands\n  return\nfi\ncase $words[2] in\n";
   for (const CLI::App* command : commandsOf(app)) {
     text += "  " + command->get_name() + ") _arguments";
     for (const CLI::Option* option : optionsOf(*command)) {
       for (const std::string& name : option->get_lnames())
-        text += " \\\n    '--" + name + "[" + plain(option->get_description(), kOfZsh) + "]" +
+        text += " \\\n    '--" + name + "[" + zshQuoted(option->get_description(), ":[]\\") + "]" +
                 (takesValue(*option) ? ":value:_files'" : "'");
     }
     text += " \\\n    '*:file:_files' ;;\n";
@@ -169,12 +179,11 @@ std::string fishCompletion(const CLI::App& app) {
   for (const CLI::App* command : commandsOf(app)) {
     const std::string& name = command->get_name();
     text += "complete -c hapticd -n __fish_use_subcommand -f -a " + name + " -d '" +
-            plain(command->get_description(), kOfFish) + "'\n";
+            fishQuoted(command->get_description()) + "'\n";
     for (const CLI::Option* option : optionsOf(*command)) {
       for (const std::string& each : option->get_lnames()) {
         text += "complete -c hapticd -n '__fish_seen_subcommand_from " + name + "' -l " + each +
-                (takesValue(*option) ? " -r" : "") + " -d '" + plain(option->get_description(), kOfFish) +
-                "'\n";
+                (takesValue(*option) ? " -r" : "") + " -d '" + fishQuoted(option->get_description()) + "'\n";
       }
     }
   }

@@ -68,6 +68,7 @@ grep -qFx .br "$work/share/man/man1/hapticd-serve.1"
 grep -q 'hapticd bench .*help' "$work/share/man/man1/hapticd-bench.1"
 for page in "$work"/share/man/man1/*.1; do tail -1 "$page" | grep -qx /usr/share/doc/hapticd-doc; done
 grep -qF "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH" "$work/share/fish/vendor_completions.d/hapticd.fish"
+grep -qF "Simulated device\: '\\''script'\\'' strokes the objects of the scene \[script\]" "$work/share/zsh/vendor-completions/_hapticd"
 completes() { # completes WORD...: what bash offers for the last word, one a line
   (cd "$work/files" && . "$work/share/bash-completion/completions/hapticd" && COMP_WORDS=(hapticd "$@") COMP_CWORD=$# && _hapticd && printf '%s\n' "${COMPREPLY[@]}")
 }
