@@ -87,11 +87,11 @@ TEST(WorkOfABall, follows_its_way_over_a_fine_mesh) {
     double radius_m;
     int visits;
   };
+  SceneFixture scene;
+  scene.add(heightField(
+                0.015, 300, [](double, double) { return 0.0; }, 0.3),
+            surface(1000));
   for (const Case& c : {Case{0.001, 300}, Case{0.002, 400}, Case{0.005, 800}}) {
-    SceneFixture scene;
-    scene.add(heightField(
-                  0.015, 300, [](double, double) { return 0.0; }, 0.3),
-              surface(1000));
     Ball ball(scene, c.radius_m);
     constexpr double kTurn_m = 0.008;
     for (int i = 0; i < reduced(600, 200); ++i) {
