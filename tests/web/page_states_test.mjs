@@ -177,6 +177,22 @@ test("hundreds of objects are all drawn soon, and the list says how many it leav
   await end(viewer, server);
 });
 
+test("of effects that are added at once, each has an index of its own", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.ask(`(() => {
+    const [type, add] = document.querySelectorAll("#effects .adder > *");
+    for (const one of ["spring", "viscous", "constant"]) {
+      type.value = one;
+      add.click();
+    }
+  })()`);
+  const effects = async () => (await server.state()).scenes[0].effects.map((e) => [e.index, e.type]);
+  await until("the last one", async () => (await effects()).some(([, type]) => type === "constant"));
+  assert.deepEqual(await effects(), [[0, "spring"], [1, "viscous"], [2, "constant"]]);
+  await end(viewer, server);
+});
+
 test("no force is drawn after the connection was lost", async () => {
   const server = await Server.start(hapticd);
   const viewer = await opened(server);
