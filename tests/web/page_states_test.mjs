@@ -133,6 +133,22 @@ test("a refused mesh is not said to be on its way, and the reason is shown", asy
   await end(viewer, server);
 });
 
+test("a mesh whose place another program took is not said to be there", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.page.route("**/api/state", async (route) => {
+    const state = await (await route.fetch()).json();
+    const [object] = state.scenes[0].objects;
+    if (object.triangles > 0) object.name = "other.obj";
+    await route.fulfill({ json: state });
+  });
+  await viewer.page.click("#load-bunny");
+  await viewer.until("what became of it", async () =>
+    /bunny\.obj was sent, but another program made other\.obj of object 0\./.test(await viewer.text("#drop-panel")));
+  await viewer.page.unrouteAll({ behavior: "ignoreErrors" });
+  await end(viewer, server);
+});
+
 test("a hidden page gives the hand back after a minute", async () => {
   const server = await Server.start(hapticd);
   const viewer = await opened(server);

@@ -8,6 +8,7 @@ import { Targets, type UnderWay } from "./mesh/targets";
 import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
 import { toast } from "./notice";
+import { objectName } from "./wire";
 import type { View } from "./scene3d/view";
 import type { DeviceState, ObjectState, SceneState } from "./state_types";
 
@@ -65,8 +66,11 @@ export class DropMesh {
 
   /** Looks for the sent meshes in a new state. */
   update(objects: ObjectState[]): void {
-    for (const { name, object, triangles } of this.targets.arrived(objects))
-      this.show(`${name} is now object ${object} with ${countText(triangles)} triangles.`, "good");
+    for (const { name, present, object, triangles } of this.targets.arrived(objects)) {
+      if (present === objectName(name))
+        this.show(`${name} is now object ${object} with ${countText(triangles)} triangles.`, "good");
+      else this.show(`${name} was sent, but another program made ${present || "another mesh"} of object ${object}.`, "bad");
+    }
   }
 
   /** The states that follow are of another scene. */
