@@ -56,6 +56,35 @@ test("a long device name and a long file name leave STOP and Re-arm on the scree
   await end(viewer, server);
 });
 
+test("long names and texts without a space wrap", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const fits = async (what, width, selector) => {
+    const [left, right] = await viewer.ask(
+      `(() => { const box = document.querySelector("${selector}").getBoundingClientRect(); return [box.left, box.right]; })()`,
+    );
+    assert.ok(left >= 0 && right <= width, `${what}, ${width}: ${selector} from ${left} to ${right}`);
+  };
+  for (const [width, height] of [[1366, 768], [390, 844], [320, 568]]) {
+    await viewer.page.setViewportSize({ width, height });
+    await viewer.ask("document.querySelector('#toasts').replaceChildren()");
+    await viewer.page.fill("#mark-text", `${width}-${"m".repeat(190)}`.replaceAll("-", "_"));
+    await viewer.page.press("#mark-text", "Enter");
+    await viewer.until("the marker", async () => (await viewer.text("#toasts")).includes(`${width}_mmm`));
+    await fits("a marker", width, "#toasts > div:last-child");
+    await viewer.drop({ [`${"W".repeat(120)}.obj`]: "v 0 0 0\n" });
+    await viewer.until("the refusal", async () => (await viewer.text("#drop-panel")).includes("no triangles"));
+    const wide = await viewer.ask("(() => { const p = document.querySelector('#drop-panel p'); return p.scrollWidth > p.clientWidth; })()");
+    assert.equal(wide, false, `${width}: the panel`);
+    await viewer.ask(`(() => {
+      Object.getPrototypeOf(viewer).readout = () => undefined;
+      document.querySelector("#touching").textContent = "W".repeat(64);
+    })()`);
+    await fits("a name", width, "#touching");
+  }
+  await end(viewer, server);
+});
+
 test("another device shows nothing of the one before", async () => {
   const config = await file("two.toml", '[[device]]\nname = "A"\n[[device]]\nname = "B"\n');
   const server = await Server.start(hapticd, { more: ["--config", config] });
