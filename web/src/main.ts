@@ -147,7 +147,7 @@ class Page {
   }
 
   private stop(): void {
-    this.stopUnconfirmed = this.link.send(wire.stopForces());
+    this.stopUnconfirmed = this.link.sendAtOnce(wire.stopForces());
     if (!this.stopUnconfirmed)
       toast("Not connected: the stop did not reach the server. Use the switch on the device.", 2);
     else if (!this.serverResponds || this.link.unanswered)
