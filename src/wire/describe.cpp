@@ -133,7 +133,7 @@ describes its numbers with these system messages, and any later ones before it u
 | type | meaning | sender field | payload |
 |---|---|---|---|
 | -1 | sender description | number, 0 to 1999 | 0: i32 length with NUL; 4: name, at most 95 characters, and NUL |
-| -2 | type description | number, 0 to 1999 | the same |
+| -2 | type description | number, 0 to 1999 | the same; the name is the title of the section below, a space and the name in its table: `vrpn_ForceDevice Force`, `hapticd Tick` |
 | -3 | UDP description: send datagrams here | port | dotted address and NUL |
 | -4 | log description | mode, as in the cookie | 0: i32 length; 4: i32 length; 8: file names for received and sent messages, each with a NUL the lengths do not count |
 

@@ -16,6 +16,13 @@ TEST(Documents, AreWhatTheTableSays) {
   EXPECT_EQ(text, messagesAsMarkdown()) << "stale: run wire_docs markdown > docs/wire-messages.md";
 }
 
+// The tables leave the device's part out: without it no server understands a name.
+TEST(Documents, SayWhatAMessageIsCalledOnTheWire) {
+  const std::string name(info(kindOf<Force>).name);
+  EXPECT_EQ(name, "vrpn_ForceDevice Force");
+  EXPECT_NE(messagesAsMarkdown().find('`' + name + '`'), std::string::npos);
+}
+
 TEST(Documents, PythonHasTheMessagesOfTheTable) {
   std::ifstream in(HAPTICD_TESTDATA "/../python/hapticd/_messages.py");
   const std::string text((std::istreambuf_iterator<char>(in)), {});

@@ -4,10 +4,11 @@ import type { Channel, Link } from "./link";
 import { readMeshBeside } from "./mesh/read_beside";
 import { isMeshFile } from "./mesh/mesh_files";
 import { Placing } from "./mesh/placing";
-import { Targets } from "./mesh/targets";
+import { Targets, type UnderWay } from "./mesh/targets";
 import { upload } from "./mesh/upload";
 import type { FileMesh } from "./mesh/weld";
 import { toast } from "./notice";
+import { objectName } from "./wire";
 import type { View } from "./scene3d/view";
 import type { DeviceState, ObjectState, SceneState } from "./state_types";
 
@@ -17,6 +18,9 @@ export interface DropContext {
   device(): DeviceState | undefined;
   scene(): SceneState | undefined;
 }
+
+/** The server tells a reason for the same refusal once in this time. */
+const REFUSAL_MS = 1000;
 
 export class DropMesh {
   private readonly panel = byId("drop-panel");
@@ -29,6 +33,10 @@ export class DropMesh {
   private choice = new AbortController();
   /** Ends with the upload that was asked for last. */
   private uploads: Promise<void> = Promise.resolve();
+  /** The mesh that was sent last. */
+  private last: { name: string; way: UnderWay } | undefined;
+  /** Why the server refused one; until then it refuses others without a text of their own. */
+  private refusal = { why: "", until_ms: 0 };
   /** The mesh that is being sent; empty: none. */
   sending = "";
 
@@ -58,13 +66,24 @@ export class DropMesh {
 
   /** Looks for the sent meshes in a new state. */
   update(objects: ObjectState[]): void {
-    for (const { name, object, triangles } of this.targets.arrived(objects))
-      this.show(`${name} is now object ${object} with ${countText(triangles)} triangles.`, "good");
+    for (const { name, present, object, triangles } of this.targets.arrived(objects)) {
+      if (present === objectName(name))
+        this.show(`${name} is now object ${object} with ${countText(triangles)} triangles.`, "good");
+      else this.show(`${name} was sent, but another program made ${present || "another mesh"} of object ${object}.`, "bad");
+    }
   }
 
   /** The states that follow are of another scene. */
   clear(): void {
     this.targets.clear();
+  }
+
+  /** The server refused the batch of the mesh that was sent last. */
+  refused(why: string): void {
+    if (!this.last?.way.isUnderWay()) return;
+    this.last.way.takeBack();
+    this.refusal = { why, until_ms: performance.now() + REFUSAL_MS };
+    this.show(`${this.last.name}: ${why}`, "bad");
   }
 
   private async open(files: File[]): Promise<void> {
@@ -150,18 +169,20 @@ export class DropMesh {
     const scene = this.context.scene();
     const objects = scene?.objects ?? [];
     const placement = placing.placement(this.targets.next(objects), scene);
-    const sent = this.targets.begin(placement.object, name, objects);
+    const way = this.targets.begin(placement.object, name, objects);
+    this.last = { name, way };
     this.sending = name;
     this.bar.value = 0;
     this.bar.hidden = false;
     this.show(`Sending ${name} …`);
     try {
       if (this.context.device()?.name !== device) throw new Error("another device was chosen before it could be sent");
+      if (performance.now() < this.refusal.until_ms) throw new Error(this.refusal.why);
       await upload(channel, mesh, placement, (share) => (this.bar.value = share));
       // A small mesh may be in the server's state before its last bytes are known to have left.
-      if (sent.isUnderWay()) this.show(`${name} is sent; the server is processing it …`, "waiting");
+      if (way.isUnderWay()) this.show(`${name} is sent; the server is processing it …`, "waiting");
     } catch (error) {
-      sent.takeBack();
+      way.takeBack();
       const text = `${name}: ${(error as Error).message}`;
       this.show(text, "bad");
       toast(text, 2); // the text of the next upload replaces the other

@@ -27,6 +27,7 @@ const KEY_MM = 2;
 const REFRESH_MS = 200;
 const LEG_TIMEOUT_MS = 900;
 const IDLE_MS = 60_000;
+const IDLE_CHECK_MS = 1000;
 
 const REFUSALS: readonly number[] = [REFUSAL.handNotSimulated, REFUSAL.handHeldByOther, REFUSAL.handPoseInvalid];
 
@@ -68,6 +69,8 @@ export class Hand {
     canvas.addEventListener("pointercancel", () => this.up());
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
+    // Not with the frames: a hidden page has none.
+    window.setInterval(() => this.letGoWhenIdle(), IDLE_CHECK_MS);
   }
 
   get pressing_mm(): number {
@@ -97,7 +100,6 @@ export class Hand {
   /** Call once per frame: sends the target of the hand. */
   frame(time_ms: number): void {
     if (!this.held) return;
-    if (time_ms - this.usedAt_ms > IDLE_MS && !this.dragging) return this.letGo();
     this.advance(time_ms);
     if (time_ms - this.sentAt_ms < REFRESH_MS && !this.targetChanged) return;
     this.targetChanged = false;
@@ -155,6 +157,10 @@ export class Hand {
     this.target.addScaledVector(right, direction[0] * step).addScaledVector(up, direction[1] * step);
     if (direction[2] !== 0) this.target.addScaledVector(this.view.axes().into, direction[2] * step);
     this.noteUse();
+  }
+
+  private letGoWhenIdle(): void {
+    if (performance.now() - this.usedAt_ms > IDLE_MS && !this.dragging) this.letGo();
   }
 
   private noteUse(): void {

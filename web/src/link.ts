@@ -10,6 +10,9 @@ const MOST_SILENT = 3;
 const PONG_LATE = 3;
 /** Intervals until a missing pong alone ends the connection: on a slow network a ping waits behind an upload. */
 const MOST_UNANSWERED = 20;
+/** Bytes that may wait on their way before a stop takes another one: 0.1 s at 5 Mbit/s. */
+const MOST_BACKLOG = 65_536;
+const BESIDE_MS = 10_000;
 const RETRY_FIRST_MS = 500;
 const RETRY_MAX_MS = 4000;
 
@@ -55,6 +58,13 @@ export interface Channel {
   readonly waiting: number;
 }
 
+function newSocket(): WebSocket {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const socket = new WebSocket(`${scheme}://${location.host}/vrpn`);
+  socket.binaryType = "arraybuffer";
+  return socket;
+}
+
 export class Link {
   state: LinkState = "connecting";
   /** To which everything is sent; empty before the first connection. */
@@ -69,6 +79,12 @@ export class Link {
   /** Names of messages that could not be read, and of which the console has been told. */
   private readonly unreadable = new Set<string>();
   private retry_ms = RETRY_FIRST_MS;
+  /** Bytes that were sent, and those of them of which a pong says that the server has read them. */
+  private sent = 0;
+  private sentAtPing = 0;
+  private sentAtPong = 0;
+  /** The connection of a stop, until the server has read it. */
+  private beside: Endpoint | undefined;
 
   constructor(
     private readonly onState: (state: LinkState) => void,
@@ -80,16 +96,19 @@ export class Link {
   /** Connects as a client of this device, and reconnects when the connection is lost. */
   connect(device: string): void {
     this.device = device;
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/vrpn`);
-    socket.binaryType = "arraybuffer";
+    const socket = newSocket();
     const clock = new ServerClock();
+    this.sent = this.sentAtPing = this.sentAtPong = 0;
     const peer = new Endpoint(
-      (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
+      (bytes) => {
+        this.sent += bytes.length;
+        socket.send(bytes as Uint8Array<ArrayBuffer>);
+      },
       (message) => {
         if (message.name === PONG) {
           clock.onPong(message.time_s);
           this.unansweredTicks = 0;
+          this.sentAtPong = this.sentAtPing;
         }
         this.read(message, clock.age_s(message.time_s));
       },
@@ -110,6 +129,37 @@ export class Link {
   /** Whether the messages were sent; false while not connected. */
   send(...messages: Outgoing[]): boolean {
     return this.channel().send(...messages);
+  }
+
+  /** A stop. Behind an upload it would wait for a slow network: then it goes on a connection of its own, too. */
+  sendAtOnce(message: Outgoing): boolean {
+    const sent = this.send(message);
+    if (sent && this.sent - this.sentAtPong > MOST_BACKLOG) this.sendBeside(message);
+    return sent;
+  }
+
+  private sendBeside(message: Outgoing): void {
+    if (this.beside) return; // its stop is on its way
+    const { device } = this;
+    const socket = newSocket();
+    const peer = new Endpoint(
+      (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
+      ({ name }) => name === PONG && end(),
+    );
+    const end = (): void => {
+      if (this.beside === peer) this.beside = undefined;
+      socket.close();
+    };
+    this.beside = peer;
+    socket.onopen = () => peer.open();
+    socket.onmessage = (event: MessageEvent<ArrayBuffer>) => {
+      const greeted = peer.connected;
+      peer.feed(new Uint8Array(event.data));
+      if (greeted || !peer.connected) return;
+      for (const each of [...this.greeting(), message, ping()]) peer.send(device, each);
+    };
+    socket.onclose = end;
+    window.setTimeout(end, BESIDE_MS);
   }
 
   /** For what takes several turns: another device or a new connection does not get the rest of it. */
@@ -172,6 +222,7 @@ export class Link {
       this.unansweredTicks = 0;
       this.clock.sent();
       this.send(ping());
+      this.sentAtPing = this.sent;
     };
     this.silentTicks = 0;
     sendPing();

@@ -14,6 +14,7 @@ const MAX_SAMPLES = 1400;
 
 /** Marks older than the window are dropped beyond this number. */
 const MOST_MARKS = 100;
+const TRIP_COLOUR = "--bad";
 
 type LoopTime = "period_us" | "wakeup_us" | "compute_us";
 
@@ -28,10 +29,10 @@ export class LivePlots {
   private before: Histogram | undefined;
   private newest: Tick | undefined;
   private meanSince: Tick | undefined;
-  private device = "";
   private turn = 0;
   private readonly marks: Mark[] = [];
-  private trips = 0;
+  /** Of the newest tick; those of the first one began before. */
+  private trips: number | undefined;
 
   constructor() {
     this.bindTools();
@@ -86,6 +87,13 @@ export class LivePlots {
     this.mark({ time_s, label, colour: "--second" });
   }
 
+  /** Another device: its samples and trips follow. Markers are of all devices. */
+  clear(): void {
+    for (const plot of this.timed) plot.clear();
+    this.marks.splice(0, Infinity, ...this.marks.filter((mark) => mark.colour !== TRIP_COLOUR));
+    this.trips = this.before = this.newest = this.meanSince = undefined;
+  }
+
   /** Nothing is known any more. */
   lost(): void {
     for (const plot of this.timed) plot.lost();
@@ -100,12 +108,12 @@ export class LivePlots {
   // Trips that remove the force; clamps are part of normal rendering.
   private markTrips(tick: Tick, time_s: number): void {
     const now = tick.guardActive | tick.guardLatched;
-    const begun = now & ~this.trips;
+    const begun = now & ~(this.trips ?? now);
     this.trips = now;
     if (begun === 0) return;
     for (const [name, trip] of Object.entries(TRIPS))
       if ((begun & (1 << trip.bit)) !== 0 && trip.action !== "clamp")
-        this.mark({ time_s, label: name, colour: "--bad" });
+        this.mark({ time_s, label: name, colour: TRIP_COLOUR });
   }
 
   private get timed(): Plot[] {
@@ -158,11 +166,6 @@ export class LivePlots {
   }
 
   state(device: DeviceState, time_s: number): void {
-    if (device.name !== this.device) {
-      for (const plot of [this.force, this.depth, this.latency, this.period]) plot.clear();
-      this.device = device.name;
-      this.before = undefined;
-    }
     const now = device.loop.period_us;
     const since = between(this.before, now);
     const mean_us = this.mean_us();

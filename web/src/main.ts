@@ -18,7 +18,7 @@ import { SourcesPanel } from "./panels/sources";
 import { css } from "./plots/plot";
 import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
-import { TRIPS } from "./server_tables";
+import { REFUSAL, TRIPS } from "./server_tables";
 import { pollServers } from "./servers";
 import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
@@ -46,6 +46,10 @@ class Page {
   private serverResponds = true;
   /** A stop was sent, and the server has not reported it yet. */
   private stopUnconfirmed = false;
+  /** Of meshes that arrived or went, the picture does not know yet. */
+  private meshesChanged = false;
+  /** What the left mouse button does. */
+  private drag = "surface";
   /** Number of drawn frames. */
   frames = 0;
 
@@ -63,8 +67,14 @@ class Page {
     () => this.showHand(),
   );
   private readonly meshes = new Meshes(
-    (id, mesh) => this.setMesh(() => this.view.objects.setMesh(id, mesh)),
-    (id) => this.setMesh(() => this.view.objects.remove(id)),
+    (id, mesh) => {
+      this.view.objects.setMesh(id, mesh);
+      this.meshesChanged = true;
+    },
+    (id) => {
+      this.view.objects.remove(id);
+      this.meshesChanged = true;
+    },
   );
   private readonly drop = new DropMesh({
     link: this.link,
@@ -137,7 +147,7 @@ class Page {
   }
 
   private stop(): void {
-    this.stopUnconfirmed = this.link.send(wire.stopForces());
+    this.stopUnconfirmed = this.link.sendAtOnce(wire.stopForces());
     if (!this.stopUnconfirmed)
       toast("Not connected: the stop did not reach the server. Use the switch on the device.", 2);
     else if (!this.serverResponds || this.link.unanswered)
@@ -161,6 +171,7 @@ class Page {
   }
 
   private chooseDrag(value: string): void {
+    this.drag = value;
     const camera = value === "camera";
     this.view.handOnLeft(!camera);
     this.hand.enabled = !camera;
@@ -216,12 +227,15 @@ class Page {
     this.showHand();
     const { server } = state;
     this.replay.update(server.replay);
-    if (server.replay && this.hand.enabled) this.chooseDrag("camera");
+    // In a replay there is no hand to move; the choice stands for the live server that follows.
+    const drag = server.replay ? "camera" : document.querySelector<HTMLInputElement>("#drag-is input:checked")!.value;
+    if (drag !== this.drag) this.chooseDrag(drag);
     this.recording = server.recording !== null;
     byId("record").setAttribute("aria-pressed", String(this.recording));
     setText(byId("record"), this.recording ? "End recording" : "Record");
     byId("recording").hidden = !this.recording;
     setText(byId("recording"), `● ${server.recording ?? ""}`);
+    byId("recording").title = server.recording ?? "";
     setText(
       byId("about"),
       `hapticd ${server.version}, ${server.replay ? `replays ${server.replay.file}` : `${device.driver} at ${device.rate_Hz} Hz${device.realtime ? "" : ", not realtime"}`}, running for ${durationText(server.uptime_s)}`,
@@ -240,8 +254,9 @@ class Page {
     setText(byId("legend-to"), quantity === "stiffness" ? `${rangeOf(this.objects(), quantity)} N/m` : "1");
   }
 
-  private setMesh(change: () => void): void {
-    change();
+  /** Once in a frame: of a thousand objects many arrive between two frames. */
+  private showMeshes(): void {
+    this.meshesChanged = false;
     this.showObjects();
     this.view.invalidate();
   }
@@ -264,8 +279,17 @@ class Page {
     this.meshes.clear();
     this.drop.clear();
     this.sourcesPanel.clear();
+    this.plots.clear();
+    this.tripAt_ms.clear();
+    this.contacts = [];
+    this.remote = [];
     this.tick = undefined;
+    this.tickIsNew = false;
+    // Now, not with the next state: the ticks of the other device go on.
+    this.device = this.state?.devices.find((d) => d.name === name);
+    this.scene = this.device && this.state?.scenes[this.device.scene];
     this.subscribe();
+    if (this.device && this.state) this.show(this.device, this.state);
   }
 
   private showNotice(): void {
@@ -314,6 +338,9 @@ class Page {
     for (const id of ["force", "depth", "touching"]) setText(byId(id), "–");
     this.guard.lost();
     this.plots.lost();
+    this.view.markers.hide();
+    this.view.sources.hide();
+    this.view.invalidateLive();
     this.showHeld("NO CONNECTION");
     this.showHand();
   }
@@ -362,6 +389,11 @@ class Page {
 
   private onText({ severity, level, text }: wire.ServerText): void {
     if (refusesHand(level, text)) this.hand.onLost();
+    if (level === REFUSAL.notPermitted) {
+      // One text says why, and one for each kind of message that follows from it.
+      if (text.endsWith("it belongs to a batch that was refused")) return;
+      if (text.includes("Batch_Begin refused: ")) this.drop.refused(text);
+    }
     toast(text, severity);
   }
 
@@ -436,6 +468,7 @@ class Page {
 
   private frame(time_ms: number): void {
     this.hand.frame(time_ms);
+    if (this.meshesChanged) this.showMeshes();
     if (this.tick && this.tickIsNew) {
       this.tickIsNew = false;
       const contacts = this.tick.object < 0 && this.tick.depth === 0 ? [] : this.contacts;

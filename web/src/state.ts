@@ -46,11 +46,13 @@ export function pollState(onState: (state: ServerState | undefined) => void): vo
   void poll();
 }
 
-/** The display meshes of one scene: fetches them one at a time when their shape has changed. */
+/** The display meshes of one scene: fetches them one after the other when their shape has changed. */
 export class Meshes {
   private readonly have = new Map<number, string>();
   private request: AbortController | undefined;
   private notBefore_ms = 0;
+  private scene = 0;
+  private objects: ObjectState[] = [];
 
   constructor(
     private readonly onMesh: (object: number, mesh: DisplayMesh) => void,
@@ -60,27 +62,36 @@ export class Meshes {
   clear(): void {
     for (const id of this.have.keys()) this.onGone(id);
     this.have.clear();
+    this.objects = [];
     // Its answer would be of another scene, and over a network that is gone it may never come.
     this.request?.abort();
     this.request = undefined;
   }
 
   update(scene: number, objects: ObjectState[]): void {
+    this.scene = scene;
+    this.objects = objects;
+    const withMesh = new Set(objects.filter((o) => o.triangles > 0).map((o) => o.id));
     for (const id of [...this.have.keys()]) {
-      if (objects.some((o) => o.id === id && o.triangles > 0)) continue;
+      if (withMesh.has(id)) continue;
       this.have.delete(id);
       this.onGone(id);
     }
-    const detailLevel = detailLevelOf(objects);
-    const missing = objects.find((o) => o.triangles > 0 && this.have.get(o.id) !== keyOf(o, detailLevel));
+    this.next();
+  }
+
+  private next(): void {
+    const detailLevel = detailLevelOf(this.objects);
+    const missing = this.objects.find((o) => o.triangles > 0 && this.have.get(o.id) !== keyOf(o, detailLevel));
     if (missing && !this.request && performance.now() > this.notBefore_ms)
-      void this.fetch(scene, missing, detailLevel);
+      void this.fetch(this.scene, missing, detailLevel);
   }
 
   // 503: still being simplified; 404: no longer there. A later state triggers the next attempt.
   private async fetch(scene: number, object: ObjectState, detailLevel: number): Promise<void> {
     const request = (this.request = new AbortController());
     const { signal } = request;
+    let arrived = false;
     try {
       const url = `/api/mesh?scene=${scene}&object=${object.id}&geometry=${object.geometry}`;
       const response = await fetch(url, { signal });
@@ -92,11 +103,13 @@ export class Meshes {
       if (signal.aborted) return;
       this.have.set(object.id, keyOf(object, detailLevel));
       this.onMesh(object.id, mesh);
+      arrived = true;
     } catch {
       // pollState() reports that the server does not respond.
     } finally {
       if (this.request === request) this.request = undefined;
     }
+    if (arrived) this.next(); // the state that follows is a quarter of a second away
   }
 }
 

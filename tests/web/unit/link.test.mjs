@@ -83,6 +83,40 @@ test("a socket that is closing has not sent a stop", () => {
   assert.equal(link.send(stopForces()), false);
 });
 
+test("a stop behind an upload goes on a connection of its own, too", (t) => {
+  t.mock.timers.enable({ apis: ["setInterval", "setTimeout"] });
+  const link = new Link(() => undefined, () => undefined, () => [startEffect(7)]);
+  link.connect("Arm");
+  const [socket] = Socket.all;
+  socket.accept();
+  const pong = (of) => {
+    of.server.send("Arm", { name: "vrpn_Base pong_message", payload: new Uint8Array(0) });
+    of.answer();
+  };
+  const stops = (of) => of.received.filter((name) => name === "Arm hapticd Stop_Forces").length;
+  assert.equal(link.sendAtOnce(stopForces()), true);
+  assert.equal(Socket.all.length, 1, "nothing is before it");
+  for (let i = 0; i < 2; ++i) link.send({ name: "hapticd Mesh_Vertices", payload: new Uint8Array(60_000) });
+  assert.equal(link.sendAtOnce(stopForces()), true);
+  assert.equal(link.sendAtOnce(stopForces()), true);
+  assert.equal(Socket.all.length, 2, "one connection for a key that repeats");
+  const [, beside] = Socket.all;
+  beside.accept();
+  assert.deepEqual(beside.received, ["Arm vrpn_ForceDevice startEffect", "Arm hapticd Stop_Forces", "Arm vrpn_Base ping_message"]);
+  assert.equal(stops(socket), 3);
+  pong(beside);
+  assert.equal(beside.readyState, 2, "it ends once the stop was read");
+  link.sendAtOnce(stopForces());
+  assert.equal(Socket.all.length, 3);
+  pong(socket); // of the ping before the upload
+  t.mock.timers.tick(1000);
+  pong(socket);
+  t.mock.timers.tick(10_000);
+  assert.equal(Socket.all[2].readyState, 2, "nothing answers");
+  link.sendAtOnce(stopForces());
+  assert.equal(Socket.all.length, 3, "the server has read the upload");
+});
+
 test("bytes that are no VRPN end the connection at once, and a new one is made", async () => {
   const warn = mock.method(console, "warn", () => undefined);
   const { link, states, socket } = connected();

@@ -5,7 +5,7 @@ import { bundled } from "../bundled.mjs";
 
 const { Targets } = await bundled("mesh/targets.ts");
 
-const object = (id, triangles, geometry) => ({ id, triangles, geometry });
+const object = (id, triangles, geometry, name = "") => ({ id, name, triangles, geometry });
 
 test("a new mesh becomes the first empty object, or one more", () => {
   const targets = new Targets();
@@ -25,8 +25,8 @@ test("a mesh under way keeps its object, until it is there or was not sent", () 
   first.takeBack();
   assert.deepEqual(targets.next(scene), { object: 0, isNew: false });
   assert.deepEqual(targets.arrived(scene), []);
-  const after = [object(0, 0, 1), object(1, 20, 4)];
-  assert.deepEqual(targets.arrived(after), [{ name: "two.obj", object: 1, triangles: 20 }]);
+  const after = [object(0, 0, 1), object(1, 20, 4, "two.obj")];
+  assert.deepEqual(targets.arrived(after), [{ name: "two.obj", present: "two.obj", object: 1, triangles: 20 }]);
   assert.ok(!second.isUnderWay(), "the text of its arrival stays");
   assert.deepEqual(targets.arrived(after), []);
   targets.begin(0, "three.obj", after);
@@ -39,7 +39,7 @@ test("meshes that replace one object arrive in their order", () => {
   targets.begin(0, "one.obj", [object(0, 12, 1)]);
   targets.begin(0, "two.obj", [object(0, 12, 1)]);
   assert.deepEqual(targets.arrived([object(0, 12, 1)]), []);
-  assert.deepEqual(targets.arrived([object(0, 6, 2)]), [{ name: "one.obj", object: 0, triangles: 6 }]);
+  assert.deepEqual(targets.arrived([object(0, 6, 2, "one.obj")]), [{ name: "one.obj", present: "one.obj", object: 0, triangles: 6 }]);
   assert.deepEqual(targets.arrived([object(0, 6, 2)]), []);
-  assert.deepEqual(targets.arrived([object(0, 8, 3)]), [{ name: "two.obj", object: 0, triangles: 8 }]);
+  assert.deepEqual(targets.arrived([object(0, 8, 3, "another.obj")]), [{ name: "two.obj", present: "another.obj", object: 0, triangles: 8 }]);
 });

@@ -1,7 +1,7 @@
 // Which objects the meshes of the page become, while some of them are on their way.
 import type { ObjectState } from "../state_types";
 
-type Known = Pick<ObjectState, "id" | "triangles" | "geometry">;
+type Known = Pick<ObjectState, "id" | "name" | "triangles" | "geometry">;
 
 interface Sent {
   object: number;
@@ -35,14 +35,14 @@ export class Targets {
     return { isUnderWay: () => this.underWay.includes(sent), takeBack: () => this.end(sent) };
   }
 
-  /** The meshes that are new in the server's state. */
-  arrived(objects: Known[]): { name: string; object: number; triangles: number }[] {
+  /** The meshes that are new in the server's state; `present`: the name there, another one if another program sent a mesh, too. */
+  arrived(objects: Known[]): { name: string; present: string; object: number; triangles: number }[] {
     return [...this.underWay].flatMap((sent) => {
       const found = objects.find((o) => o.id === sent.object && o.triangles > 0 && o.geometry !== sent.geometry);
       if (!found) return [];
       this.end(sent);
       for (const later of this.underWay) if (later.object === found.id) later.geometry = found.geometry;
-      return { name: sent.name, object: found.id, triangles: found.triangles };
+      return { name: sent.name, present: found.name, object: found.id, triangles: found.triangles };
     });
   }
 

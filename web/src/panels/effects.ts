@@ -2,7 +2,7 @@
 import { type Effect, type Outgoing, setEffect, startEffect, stopEffect, type Vec3 } from "../wire";
 import type { EffectState, VibrationUnit } from "../state_types";
 import { el, Rows, setText } from "./dom";
-import { Switch } from "./switch";
+import { CONFIRM_MS, Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
@@ -142,6 +142,8 @@ export class EffectsPanel {
   private readonly list = el("ul", { className: "cards" });
   private readonly rows: Rows<EffectState, EffectRow>;
   private used: number[] = [];
+  /** Indices of effects that were added here, until the state of the server must have them, ms. */
+  private readonly added = new Map<number, number>();
   private unit: VibrationUnit = "rad/s";
   /** The wire has no call that forgets an effect: a removed one is stopped, hidden, and its index used again. */
   private readonly removed = new Set<number>();
@@ -185,7 +187,9 @@ export class EffectsPanel {
 
   private newEffect(type: string): Effect {
     let index = 0;
-    while (this.used.includes(index)) ++index;
+    const now_ms = performance.now();
+    while (this.used.includes(index) || now_ms < (this.added.get(index) ?? 0)) ++index;
+    this.added.set(index, now_ms + CONFIRM_MS);
     const none: Effect = {
       type,
       index,

@@ -30,19 +30,14 @@ export class GuardPanel {
 
   /** `recent`: trips of the last second, which the polled state may have missed. */
   update(device: DeviceState, recent: string[] = []): void {
-    const active = [...new Set([...device.guard.active, ...recent])];
-    device = { ...device, guard: { ...device.guard, active } };
     const { guard } = device;
-    const zero =
-      guard.stopped ||
-      !guard.armed ||
-      guard.latched.length > 0 ||
-      guard.active.some((name) => tripOf(name)?.action !== "clamp");
-    this.summary.dataset["level"] = zero || device.fault ? "bad" : guard.active.length > 0 ? "warn" : "good";
-    setText(this.summary, device.fault ? `Device fault: ${device.fault}` : summaryOf(device, zero));
+    const active = [...new Set([...guard.active, ...recent])];
+    const zero = guard.stopped || !guard.armed || guard.latched.length > 0 || guard.active.some(removesForce);
+    this.summary.dataset["level"] = zero || device.fault ? "bad" : active.length > 0 ? "warn" : "good";
+    setText(this.summary, device.fault ? `Device fault: ${device.fault}` : summaryOf(device, zero, active));
     const lines = guard.latched.map((name): Line => ({ name, latched: true }));
     lines.push(
-      ...guard.active
+      ...active
         .filter((name) => !guard.latched.includes(name))
         .map((name): Line => ({ name, latched: false })),
     );
@@ -50,15 +45,15 @@ export class GuardPanel {
   }
 }
 
-function summaryOf(device: DeviceState, zero: boolean): string {
+/** Of the present; `active` also names the trips of the last second. */
+function summaryOf(device: DeviceState, zero: boolean, active: string[]): string {
   const { guard } = device;
   if (guard.stopped) return "Stopped: no force until re-armed.";
   if (guard.latched.length > 0) return "Tripped: no force until re-armed.";
   if (!guard.armed) return "Not armed: no force.";
   if (zero) return "The guard holds the force at zero.";
-  return guard.active.length > 0
-    ? "Armed. The guard limits the force."
-    : "Armed. The guard does not change the force.";
+  if (active.some(removesForce)) return "Armed. The guard held the force at zero in the last second.";
+  return active.length > 0 ? "Armed. The guard limits the force." : "Armed. The guard does not change the force.";
 }
 
 function makeRow(line: Line): { root: HTMLElement; update(): void } {
@@ -75,6 +70,8 @@ function makeRow(line: Line): { root: HTMLElement; update(): void } {
 
 /** The trip of a name; none for a name of a newer server. */
 const tripOf = (name: string): Trip | undefined => (TRIPS as Record<string, Trip>)[name];
+
+const removesForce = (name: string): boolean => tripOf(name)?.action !== "clamp";
 
 /** Text in backticks becomes code. */
 const withCode = (text: string): (Node | string)[] =>

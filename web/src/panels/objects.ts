@@ -10,6 +10,8 @@ import { Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
 
+const MOST_ROWS = 200;
+
 interface Item {
   o: ObjectState;
   scene: SceneState;
@@ -67,6 +69,7 @@ class ObjectRow {
 
 export class ObjectsPanel {
   private readonly list = el("ul", { className: "cards" });
+  private readonly more = el("p", { className: "quiet" });
   private readonly rows: Rows<Item, ObjectRow>;
 
   constructor(parent: HTMLElement, send: Send, centreOf: (id: number) => Vector3) {
@@ -74,12 +77,15 @@ export class ObjectsPanel {
       this.list,
       ({ o }) => String(o.id),
       ({ o }) => new ObjectRow(o.id, send, centreOf),
+      MOST_ROWS,
     );
-    parent.append(this.list);
+    parent.append(this.list, this.more);
   }
 
   update(scene: SceneState | undefined, touched: number): void {
     this.rows.update(scene ? scene.objects.map((o) => ({ o, scene })) : []);
+    const left = (scene?.objects.length ?? 0) - MOST_ROWS;
+    setText(this.more, left > 0 ? `and ${countText(left)} more` : "");
     for (const item of this.list.children)
       (item as HTMLElement).dataset["touched"] = String(
         (item as HTMLElement).dataset["object"] === String(touched),

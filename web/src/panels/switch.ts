@@ -1,7 +1,7 @@
 // A check box for a value of the server. After a click it shows the requested value until the server confirms it or 2 s pass.
 import { el } from "./dom";
 
-const CONFIRM_MS = 2000;
+export const CONFIRM_MS = 2000;
 
 export class Switch {
   readonly root: HTMLElement;

@@ -72,10 +72,8 @@ export class Markers {
     this.spring.renderOrder = 1;
     this.spring.frustumCulled = false;
     this.box.matrixAutoUpdate = false;
-    this.shadow.visible = false;
     this.group.add(this.box, this.shadow, this.spring, this.hip, this.proxy, this.force, ...this.normals);
-    for (const part of [this.spring, this.hip, this.proxy, this.force, ...this.normals])
-      part.visible = false;
+    this.hide();
   }
 
   setColours(colours: MarkerColours): void {
@@ -127,6 +125,12 @@ export class Markers {
   /** Converts a reported position to world units. */
   world(position: Vec3): Vector3 {
     return new Vector3(...position).multiplyScalar(this.scale);
+  }
+
+  /** Nothing is known of hand and force. */
+  hide(): void {
+    for (const part of [this.shadow, this.spring, this.hip, this.proxy, this.force, ...this.normals])
+      part.visible = false;
   }
 
   update(tick: Tick, contacts: Contact[]): void {

@@ -92,6 +92,11 @@ export class Sources {
     return true;
   }
 
+  /** Nothing is known of remote contacts and forces. */
+  hide(): void {
+    for (const part of [...this.remote.children, ...this.drawn]) part.visible = false;
+  }
+
   /** Remote contacts of this tick, and the arrows. */
   tick(tick: Tick, contacts: Contact[], remote: RemoteContact[], scene: SceneState | undefined, scale: number, perN: number): void {
     while (this.remote.children.length < remote.length) this.remote.add(new Mesh(this.ball, this.remoteMaterial));

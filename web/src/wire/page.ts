@@ -152,8 +152,10 @@ const NAME_BYTES = 64;
 const MARK_BYTES = 255;
 export const mark = (text: string): Outgoing => m.Marker.encode({ time: 0, text: beginning(text, MARK_BYTES) });
 export const decodeMarker = (payload: DataView): m.Marker => m.Marker.decode(payload);
+/** As the server has it. */
+export const objectName = (text: string): string => beginning(text, NAME_BYTES);
 export const setObjectName = (object: number, text: string): Outgoing =>
-  m.SetObjectName.encode({ object, text: beginning(text, NAME_BYTES) });
+  m.SetObjectName.encode({ object, text: objectName(text) });
 export const removeObject = (object: number): Outgoing => m.RemoveObject.encode({ object });
 
 /** Speed 0 keeps it; a negative position does not seek. */

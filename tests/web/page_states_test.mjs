@@ -1,0 +1,272 @@
+// What the page shows in states beside the usual one: several devices, long names, many objects, a role without rights, a hidden
+// tab, a replay that becomes live.
+import assert from "node:assert/strict";
+import { mkdtemp, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, test } from "node:test";
+import { launch, Viewer } from "./browser.mjs";
+import { Server, until } from "./server.mjs";
+
+const [hapticd] = process.argv.slice(2);
+const folder = await mkdtemp(join(tmpdir(), "hapticd-states-"));
+const browser = await launch();
+after(async () => {
+  await browser.close();
+  await Server.stopAll();
+  await rm(folder, { recursive: true });
+});
+
+async function file(name, text) {
+  const path = join(folder, name);
+  await writeFile(path, text, { mode: 0o600 });
+  return path;
+}
+
+async function opened(server) {
+  const viewer = await Viewer.open(browser.context, server.url);
+  await viewer.connected();
+  return viewer;
+}
+
+/** Ends the page and the server. */
+async function end(viewer, server) {
+  await viewer.page.close();
+  await server.stop();
+}
+
+test("a long device name and a long file name leave STOP and Re-arm on the screen", async () => {
+  const config = await file("long.toml", `[[device]]\nname = "${"W".repeat(95)}"\n[[device]]\nname = "B"\n`);
+  const recording = join(folder, `${"session-".repeat(24)}.haptics`);
+  const server = await Server.start(hapticd, { more: ["--config", config, "--record", recording] });
+  const viewer = await opened(server);
+  await viewer.until("the name of the recording", async () => (await viewer.text("#recording")).includes("session-"));
+  for (const [width, height] of [[1920, 1080], [1366, 768], [1024, 600], [720, 900], [390, 844], [320, 568]]) {
+    await viewer.page.setViewportSize({ width, height });
+    assert.equal(await viewer.ask("document.documentElement.scrollWidth > innerWidth"), false, `${width} scrolls sideways`);
+    for (const id of ["#stop", "#rearm", "#link", "#device"]) {
+      const box = await viewer.page.locator(id).boundingBox();
+      assert.ok(box.x >= 0 && box.x + box.width <= width, `${width}: ${id} from ${box.x} to ${box.x + box.width}`);
+      assert.ok(box.y >= 0 && box.y + box.height <= height, `${width}: ${id} from ${box.y} to ${box.y + box.height}`);
+    }
+    const [shown, of] = await viewer.ask("[document.querySelector('#recording').offsetWidth, innerWidth]");
+    assert.ok(shown > 60 && shown <= of, `${width}: the recording has ${shown} pixels`);
+  }
+  assert.equal(await viewer.page.locator("#recording").getAttribute("title"), recording);
+  await end(viewer, server);
+});
+
+test("long names and texts without a space wrap", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const fits = async (what, width, selector) => {
+    const [left, right] = await viewer.ask(
+      `(() => { const box = document.querySelector("${selector}").getBoundingClientRect(); return [box.left, box.right]; })()`,
+    );
+    assert.ok(left >= 0 && right <= width, `${what}, ${width}: ${selector} from ${left} to ${right}`);
+  };
+  for (const [width, height] of [[1366, 768], [390, 844], [320, 568]]) {
+    await viewer.page.setViewportSize({ width, height });
+    await viewer.ask("document.querySelector('#toasts').replaceChildren()");
+    await viewer.page.fill("#mark-text", `${width}-${"m".repeat(190)}`.replaceAll("-", "_"));
+    await viewer.page.press("#mark-text", "Enter");
+    await viewer.until("the marker", async () => (await viewer.text("#toasts")).includes(`${width}_mmm`));
+    await fits("a marker", width, "#toasts > div:last-child");
+    await viewer.drop({ [`${"W".repeat(120)}.obj`]: "v 0 0 0\n" });
+    await viewer.until("the refusal", async () => (await viewer.text("#drop-panel")).includes("no triangles"));
+    const wide = await viewer.ask("(() => { const p = document.querySelector('#drop-panel p'); return p.scrollWidth > p.clientWidth; })()");
+    assert.equal(wide, false, `${width}: the panel`);
+    await viewer.ask(`(() => {
+      Object.getPrototypeOf(viewer).readout = () => undefined;
+      document.querySelector("#touching").textContent = "W".repeat(64);
+    })()`);
+    await fits("a name", width, "#touching");
+  }
+  await end(viewer, server);
+});
+
+test("another device shows nothing of the one before", async () => {
+  const config = await file("two.toml", '[[device]]\nname = "A"\n[[device]]\nname = "B"\n');
+  const server = await Server.start(hapticd, { more: ["--config", config] });
+  const viewer = await opened(server);
+  await viewer.page.click("#stop");
+  await viewer.until("the trip of A", () => viewer.ask("viewer.plots.marks.some((m) => m.label === 'stopped')"));
+  await viewer.page.fill("#mark-text", "of all");
+  await viewer.page.press("#mark-text", "Enter");
+  await viewer.until("the marker", () => viewer.ask("viewer.plots.marks.some((m) => m.label === 'of all')"));
+  // What the page says of the guard and of the force, whenever it says something else.
+  const said = viewer.ask(`new Promise((resolve) => {
+    const said = new Set();
+    const device = document.querySelector("#device");
+    device.value = "B";
+    device.dispatchEvent(new Event("change", { bubbles: true }));
+    const note = () => viewer.device.name === "B" && said.add(document.querySelector("#guard").innerText);
+    const watch = new MutationObserver(note);
+    watch.observe(document.querySelector("#guard"), { childList: true, characterData: true, subtree: true });
+    const tick = () => {
+      note();
+      if (viewer.tick && viewer.plots.force.window.size > 200) resolve([...said]);
+      else setTimeout(tick, 50);
+    };
+    tick();
+  })`);
+  assert.deepEqual((await said).filter((text) => /stopped|A client stopped/.test(text)), []);
+  assert.deepEqual(await viewer.ask("viewer.plots.marks.map((m) => m.label)"), ["of all"]);
+  assert.equal(await viewer.ask("document.querySelector('#stage').dataset.held"), "");
+  // Back at A the stop stands, and is no new one.
+  await viewer.page.selectOption("#device", "A");
+  await viewer.until("the stop of A", async () => (await viewer.text("#guard")).includes("Stopped: no force until re-armed."));
+  await viewer.until("STOPPED", () => viewer.ask("viewer.tick && document.querySelector('#stage').dataset.held === 'STOPPED'"));
+  assert.deepEqual(await viewer.ask("viewer.plots.marks.map((m) => m.label)"), ["of all"]);
+  await end(viewer, server);
+});
+
+test("the guard's summary is about now, its list about the last second", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const shown = (guard, recent) =>
+    viewer.ask(`(() => {
+      const guard = ${JSON.stringify({ armed: true, stopped: false, active: [], latched: [], ...guard })};
+      viewer.guard.update({ ...viewer.device, guard }, ${JSON.stringify(recent)});
+      const summary = document.querySelector("#guard .summary");
+      return [summary.textContent, summary.dataset.level, document.querySelectorAll("#guard .trips li").length];
+    })()`);
+  assert.deepEqual(await shown({}, []), ["Armed. The guard does not change the force.", "good", 0]);
+  assert.deepEqual(await shown({ active: ["slew"] }, []), ["Armed. The guard limits the force.", "warn", 1]);
+  assert.deepEqual(await shown({ active: ["late"] }, ["late"]), ["The guard holds the force at zero.", "bad", 1]);
+  assert.deepEqual(await shown({}, ["stopped", "late"]), [
+    "Armed. The guard held the force at zero in the last second.", "warn", 2,
+  ]);
+  await end(viewer, server);
+});
+
+test("a refused mesh is not said to be on its way, and the reason is shown", async () => {
+  const tokens = await file("tokens", "owner 0123456789abcdef0123456789abcdef\n");
+  const config = await file("roles.toml", `tokens = ${JSON.stringify(tokens)}\n[[device]]\nname = "Phantom"\n`);
+  const server = await Server.start(hapticd, { more: ["--config", config] });
+  const viewer = await opened(server);
+  await viewer.page.click("#load-bunny");
+  await viewer.until("the reason", async () =>
+    /bunny\.obj: .*your role is observer; present the token/.test(await viewer.text("#drop-panel")));
+  await viewer.settle();
+  assert.doesNotMatch(await viewer.text("#drop-panel"), /processing|Sending/);
+  assert.match(await viewer.text("#toasts"), /Batch_Begin refused: your role is observer/);
+  assert.doesNotMatch(await viewer.text("#toasts"), /belongs to a batch/);
+  await viewer.page.getByRole("button", { name: "Close" }).click();
+  await viewer.page.fill("#token-text", "0123456789abcdef0123456789abcdef");
+  await viewer.page.press("#token-text", "Enter");
+  await until("an owner", async () => (await server.state()).clients[0].role === "owner");
+  await viewer.until("the button", () => viewer.page.isVisible("#load-bunny"));
+  await viewer.page.click("#load-bunny");
+  await viewer.until("it arrives", async () => /is now object 0 with 3,674/.test(await viewer.text("#drop-panel")));
+  await end(viewer, server);
+});
+
+test("a mesh whose place another program took is not said to be there", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.page.route("**/api/state", async (route) => {
+    const state = await (await route.fetch()).json();
+    const [object] = state.scenes[0].objects;
+    if (object.triangles > 0) object.name = "other.obj";
+    await route.fulfill({ json: state });
+  });
+  await viewer.page.click("#load-bunny");
+  await viewer.until("what became of it", async () =>
+    /bunny\.obj was sent, but another program made other\.obj of object 0\./.test(await viewer.text("#drop-panel")));
+  await viewer.page.unrouteAll({ behavior: "ignoreErrors" });
+  await end(viewer, server);
+});
+
+test("a hidden page gives the hand back after a minute", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.holdInAir();
+  await until("the page holds the hand", async () => (await server.state()).devices[0].held_by !== null);
+  // A hidden page draws no frames.
+  await viewer.ask("(() => { window.requestAnimationFrame = () => 0; })()");
+  const frames = () => viewer.ask("viewer.frames");
+  for (let last = -1, now = await frames(); now !== last; now = await frames()) {
+    last = now;
+    await viewer.settle();
+  }
+  await viewer.ask("viewer.hand.usedAt_ms -= 61_000");
+  await until("the hand is free", async () => (await server.state()).devices[0].held_by === null);
+  await end(viewer, server);
+});
+
+test("hundreds of objects are all drawn soon, and the list says how many it leaves out", async () => {
+  const server = await Server.start(hapticd);
+  const { wire, send, close } = await server.client();
+  const corners = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+  send(wire.batchBegin(), wire.setObjectNumber(300));
+  for (let i = 0; i < 300; ++i) send(wire.meshVertices(i, 0, corners), wire.meshTriangles(i, 0, Uint32Array.of(0, 1, 2)));
+  send(wire.batchCommit());
+  await until("the scene", async () => (await server.state()).scenes[0].objects.length === 300);
+  const viewer = await opened(server);
+  await viewer.until("a state", () => viewer.ask("viewer.objects().length === 300"));
+  // By polls, not by time: the state is asked for four times per second.
+  await viewer.ask(`(() => {
+    const { update } = viewer.meshes;
+    viewer.polls = 0;
+    viewer.meshes.update = function (...all) { ++viewer.polls; return update.apply(this, all); };
+  })()`);
+  await until("all in the view", () => viewer.ask("viewer.view.objects.triangles === 300"), 120_000);
+  const polls = await viewer.ask("viewer.polls");
+  assert.ok(polls < 150, `all after ${polls} states`);
+  assert.match(await viewer.text("#objects"), /and 100 more/);
+  send(wire.messages.ResetScene.encode({ ignored: 0 }));
+  await viewer.until("one object", () => viewer.ask("viewer.objects().length === 1"));
+  assert.doesNotMatch(await viewer.text("#objects"), /more/);
+  close();
+  await end(viewer, server);
+});
+
+test("of effects that are added at once, each has an index of its own", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.ask(`(() => {
+    const [type, add] = document.querySelectorAll("#effects .adder > *");
+    for (const one of ["spring", "viscous", "constant"]) {
+      type.value = one;
+      add.click();
+    }
+  })()`);
+  const effects = async () => (await server.state()).scenes[0].effects.map((e) => [e.index, e.type]);
+  await until("the last one", async () => (await effects()).some(([, type]) => type === "constant"));
+  assert.deepEqual(await effects(), [[0, "spring"], [1, "viscous"], [2, "constant"]]);
+  await end(viewer, server);
+});
+
+test("no force is drawn after the connection was lost", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.page.getByRole("button", { name: "Add" }).click();
+  const drawn = () => viewer.ask("[...viewer.view.markers.group.children].filter((part) => part.visible).length");
+  await viewer.forceIs("1 N", (force_N) => Math.abs(force_N - 1) < 0.02);
+  assert.ok((await drawn()) > 3);
+  await server.stop();
+  await viewer.until("the notice", async () => (await viewer.text("#link")) === "lost");
+  assert.equal(await drawn(), 1, "the workspace");
+  await viewer.page.close();
+});
+
+test("a page of a replay moves the hand of the live server that follows", async () => {
+  const recording = join(folder, "short.haptics");
+  const recorded = await Server.start(hapticd, { more: ["--record", recording] });
+  await until("some ticks", async () => (await recorded.state()).devices[0].loop.ticks > 500);
+  await recorded.stop();
+  const replayed = await Server.start(hapticd, { replay: recording });
+  const viewer = await opened(replayed);
+  await viewer.until("the replay", () => viewer.page.isVisible("#replay"));
+  assert.equal(await viewer.ask("viewer.hand.enabled"), false);
+  await replayed.stop();
+  const live = await Server.start(hapticd, { http: new URL(replayed.url).host });
+  await viewer.until("live", () => viewer.ask("viewer.link.state === 'open' && viewer.state.server.replay === null && viewer.tick"));
+  assert.equal(await viewer.page.isVisible("#replay"), false);
+  await viewer.holdInAir();
+  await until("the page holds the hand", async () => (await live.state()).devices[0].held_by !== null);
+  await viewer.release();
+  await viewer.letGo();
+  await end(viewer, live);
+});
