@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <variant>
 #include <vector>
@@ -84,9 +85,10 @@ std::string dateText(base::Nanos wall) {
 
 void print(const DeviceFacts& facts, const record::RecordedDevice& device, base::Nanos first) {
   std::string names;
-  for (const std::string& name : device.names) names += (names.empty() ? "" : ", ") + name;
-  std::printf("device      %s: %s (%s), scene %u, %g ticks per second\n", names.c_str(), device.model.c_str(),
-              device.driver.c_str(), device.scene, device.tick.rate_Hz);
+  for (const std::string& name : device.names) names += (names.empty() ? "" : ", ") + base::printable(name);
+  std::printf("device      %s: %s (%s), scene %u, %g ticks per second\n", names.c_str(),
+              base::printable(device.model).c_str(), base::printable(device.driver).c_str(), device.scene,
+              device.tick.rate_Hz);
   const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   const double part =
       facts.ticks > 0 ? 100.0 * static_cast<double>(facts.inContact) / static_cast<double>(facts.ticks) : 0;
@@ -105,6 +107,16 @@ void print(const DeviceFacts& facts, const record::RecordedDevice& device, base:
   std::printf("  guard     %s\n", trips.empty() ? "never acted" : trips.c_str());
 }
 
+// The configuration, line by line.
+void printConfig(std::string_view config) {
+  std::putchar('\n');
+  while (!config.empty()) {
+    const std::string_view line = config.substr(0, config.find('\n'));
+    std::printf("%s\n", base::printable(line).c_str());
+    config.remove_prefix(std::min(line.size() + 1, config.size()));
+  }
+}
+
 int run(const std::string& file, bool config, bool json) {
   if (json) {
     const record::Sidecar sidecar = record::sidecarOf(file);
@@ -115,7 +127,7 @@ int run(const std::string& file, bool config, bool json) {
   const record::RecordingHeader& header = reader.header();
   const RecordingFacts facts = factsOf(reader);
   std::printf("recording   %s\n", file.c_str());
-  std::printf("written by  %s, force law %u\n", header.program.c_str(), header.law.number);
+  std::printf("written by  %s, force law %u\n", base::printable(header.program).c_str(), header.law.number);
   std::printf("began       %s\n", facts.first == 0
                                       ? "without a tick"
                                       : dateText(facts.first + reader.wallOffsetAt(facts.first)).c_str());
@@ -127,7 +139,7 @@ int run(const std::string& file, bool config, bool json) {
   for (const record::MarkerEvent& marker : facts.markers)
     std::printf("marker      %.3f s: %s\n", base::toSeconds(marker.time - facts.first),
                 base::printable(marker.text).c_str());
-  if (config) std::printf("\n%s", header.config.c_str());
+  if (config) printConfig(header.config);
   if (!reader.remark().empty()) std::fprintf(stderr, "hapticd: %s\n", reader.remark().c_str());
   return statusFor(reader.remark());
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <string_view>
 
 namespace hapticd::apps {
@@ -55,9 +56,16 @@ void ProgressBar::show(std::uint64_t done, std::uint64_t total) {
   const std::string amount =
       bytesText(static_cast<double>(done)) + " of " + bytesText(static_cast<double>(total));
   if (onTerminal()) {
-    constexpr int kWidth = 40;
-    const std::string bar(static_cast<std::size_t>(percent * kWidth / 100), '#');
-    std::printf("\r%s [%-*s] %3d %% %s\x1b[K", title_.c_str(), kWidth, bar.c_str(), percent, amount.c_str());
+    // On a narrow terminal the bar is shorter: a line that wraps stays above the next one.
+    constexpr std::size_t kWidth = 40;
+    char numbers[64];
+    std::snprintf(numbers, sizeof numbers, "%3d %% %s", percent, amount.c_str());
+    const std::size_t columns = terminalSize().columns - 1;
+    const std::size_t others = title_.size() + std::strlen(" [] ") + std::strlen(numbers);
+    const std::size_t width = std::min(kWidth, std::max(columns, others) - others);
+    std::string bar(static_cast<std::size_t>(percent) * width / 100, '#');
+    bar.resize(width, ' ');
+    std::printf("\r%s\x1b[K", cutTo(title_ + " [" + bar + "] " + numbers, columns).c_str());
   } else if (shownPercent_ < 0 || percent / 10 > shownPercent_ / 10) {
     std::printf("%s %d %% %s\n", title_.c_str(), percent, amount.c_str());
   }

@@ -1,21 +1,29 @@
-// Tells a person that rows are missing in a stream of ticks.
+// Rows of a stream of ticks: each tick is one, and a person is told of those that are missing.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <optional>
+
+#include "hapticd/reports.h"
 
 namespace hapticd::apps {
 
 /// Counts the ticks between others that did not arrive.
 class MissingTicks {
  public:
-  void add(std::uint64_t tick) noexcept {
-    if (last_ && tick > *last_ + 1) missing_ += tick - *last_ - 1;
-    last_ = tick;
+  /// False for a tick that is not later than one before: a server repeats the newest one to a client that has
+  /// caught up, and datagrams may overtake it. Numbers begin again in a replay, times do not.
+  bool add(const TickReport& report) noexcept {
+    if (lastTick_ && report.tickTime <= lastTime_) return false;
+    if (lastTick_ && report.tick > *lastTick_ + 1) missing_ += report.tick - *lastTick_ - 1;
+    lastTick_ = report.tick;
+    lastTime_ = report.tickTime;
+    return true;
   }
   /// After a new connection: the server may count anew.
-  void restart() noexcept { last_.reset(); }
+  void restart() noexcept { lastTick_.reset(); }
   /// Prints the number, unless it is 0 or ticks are left out on purpose at this rate.
   void print(const char* program, double rate_Hz, double servoRate_Hz) const {
     if (missing_ == 0 || rate_Hz < servoRate_Hz) return;
@@ -26,7 +34,8 @@ class MissingTicks {
   }
 
  private:
-  std::optional<std::uint64_t> last_;
+  std::optional<std::uint64_t> lastTick_;
+  std::chrono::nanoseconds lastTime_{};
   std::uint64_t missing_ = 0;
 };
 

@@ -62,7 +62,7 @@ std::uint32_t deviceNamed(const record::RecordingHeader& header, const std::stri
   for (std::uint32_t i = 0; i < header.devices.size(); ++i) {
     for (const std::string& each : header.devices[i].names) {
       if (each == name) return i;
-      known += (known.empty() ? "" : ", ") + each;
+      known += (known.empty() ? "" : ", ") + base::printable(each);
     }
   }
   throw std::runtime_error("the recording has no device '" + name + "'; it has " + known);
@@ -72,7 +72,7 @@ Data read(const PlotOptions& options) {
   record::RecordingReader reader(options.recording);
   const std::uint32_t device = deviceNamed(reader.header(), options.device);
   Data data;
-  data.device = reader.header().devices[device].names.front();
+  data.device = base::printable(reader.header().devices[device].names.front());
   data.title = options.recording.substr(options.recording.rfind('/') + 1) + ", " + data.device;
   base::Nanos first = 0;
   std::uint32_t trips = 0;

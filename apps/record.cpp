@@ -108,9 +108,9 @@ std::size_t recordTicks(const RecordOptions& options) {
   std::size_t count = 0;
   MissingTicks missing;
   client.onTick([&](const TickReport& tick) {
+    if (!missing.add(tick)) return;
     if (!file) file = sampleFile(options.file);
     file->add(sampleOf(client.device(), tick));
-    missing.add(tick.tick);
     ++count;
   });
   client.subscribe(Reports::tick, options.rate_Hz);

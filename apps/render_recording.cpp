@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "base/printable.h"
 #include "commands.h"
 #include "record/difference.h"
 #include "record/export_file.h"
@@ -54,7 +55,7 @@ std::string csv(const std::vector<Difference>& devices) {
 }
 
 void print(const Difference& d) {
-  std::printf("device      %s: %llu ticks, %llu touching in either\n", d.device().c_str(),
+  std::printf("device      %s: %llu ticks, %llu touching in either\n", base::printable(d.device()).c_str(),
               static_cast<unsigned long long>(d.ticks()), static_cast<unsigned long long>(d.touching()));
   if (d.skipped() > 0)
     std::printf(
@@ -86,7 +87,7 @@ std::string nothingComparedIn(const std::vector<Difference>& devices) {
 std::string failureOf(const std::vector<Difference>& devices) {
   for (const Difference& d : devices) {
     if (d.same() == d.ticks()) continue;
-    std::string text = "nothing was changed, but ticks of " + d.device() + " differ: ";
+    std::string text = "nothing was changed, but ticks of " + base::printable(d.device()) + " differ: ";
     if (!d.complete()) return text + "the recorder lost some of what made them";
     if (!d.knowsPast()) {
       text +=

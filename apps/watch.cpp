@@ -84,8 +84,7 @@ void stream(Client& client, const WatchOptions& options) {
   MissingTicks missing;
   if (whole) {
     client.onTick([&](const TickReport& tick) {
-      print({sampleOf(client.device(), tick), {}});
-      missing.add(tick.tick);
+      if (missing.add(tick)) print({sampleOf(client.device(), tick), {}});
     });
     client.subscribe(Reports::tick, rate_Hz);
   }

@@ -177,6 +177,15 @@ def _text(value: str, field: _Field) -> bytes:
     return encoded
 
 
+#: What a terminal would obey, and what is no character: C0, DEL, C1 and two others.
+_UNPRINTABLE = dict.fromkeys((*range(0x20), *range(0x7F, 0xA0), 0xFFFE, 0xFFFF), "\N{REPLACEMENT CHARACTER}")
+
+
+def printable(text: str) -> str:
+    """A text of somebody else as one line, safe for terminals: control characters become U+FFFD, as in the C++ client."""
+    return text.translate(_UNPRINTABLE)
+
+
 def utf8(text: str, what: str) -> bytes:
     """A text as messages carry it. Raises ValueError for half a character, as in names of files that are no UTF-8."""
     try:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import _messages as m
 from . import reports as r
 from ._address import Address
-from ._codec import HEADER, DecodeError, Numbers, by_class, frame, has_length, is_number, padded, real_array, shortened, utf8
+from ._codec import HEADER, DecodeError, Numbers, by_class, frame, has_length, is_number, padded, printable, real_array, shortened, utf8
 from ._commands import Commands, flag, function, instance
 from ._peer import Peer, now
 from ._statistics import Statistics
@@ -174,7 +174,7 @@ _CONVERT: Final[Dict[Any, Tuple[str, Callable[[float, Any], Any]]]] = {
     m.TouchedObject: ("touched_object", lambda t, x: r.TouchedObjectReport(t, x.object)),
     m.Angle: ("angle", lambda t, x: r.AngleReport(t, x.angle, x.touching != 0)),
     m.ForceError: ("force_error", lambda t, x: r.ForceErrorReport(t, x.code)),
-    m.Text: ("text", lambda t, x: r.TextReport(t, r.Severity(min(x.severity, 2)), x.text, x.level)),
+    m.Text: ("text", lambda t, x: r.TextReport(t, r.Severity(min(x.severity, 2)), printable(x.text), x.level)),
     m.TrackerToRoom: ("to_room", lambda t, x: r.ToRoomReport(t, _array(x.position), _array(x.orientation))),
     m.TrackerUnitToSensor: (
         "unit_to_sensor",
@@ -505,7 +505,7 @@ class Core(Commands):
                 self._counts.messages_damaged += 1
                 return
             if kind == _TEXT and message.severity >= 2 and not self._first_error:
-                self._first_error = message.text
+                self._first_error = report.text
             self._deliver(name, report, arrived - stamp)
         elif kind == _STATES:
             self._handle_states(payload, stamp, arrived)
@@ -678,7 +678,7 @@ class Core(Commands):
         return f"no VRPN server at {server}: {failure or 'no answer'}"
 
     def _no_device(self) -> str:
-        others = ", ".join(self._server_devices) or "no other device"
+        others = ", ".join(map(printable, self._server_devices)) or "no other device"
         return f"no device '{self.device}' answers at {self.server}; it has {others}"
 
     def statistics(self) -> Statistics:

@@ -172,8 +172,8 @@ class ForceErrorReport(NamedTuple):
 
 
 class TextReport(NamedTuple):
-    """A text of the server for a person; refusals of commands arrive as Severity.ERROR, `level` then holds the
-    refusal code of docs/wire-extensions.md."""
+    """A text of the server for a person, one line: the server's control characters arrive as U+FFFD. Refusals of commands
+    arrive as Severity.ERROR, `level` then holds the refusal code of docs/wire-extensions.md."""
 
     time: float
     severity: Severity

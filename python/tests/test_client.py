@@ -622,6 +622,26 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         hapticd.connect("Phantom@no.such.host.invalid")
 
 
+@pytest.mark.parametrize("throws", (False, True))
+def test_what_a_server_says_does_not_reach_the_terminal_as_it_is(throws: bool) -> None:
+    server = ScriptedServer(device="Phan\x1b[2Jtom\n")
+    with pytest.raises(hapticd.ConnectError) as wrong:
+        hapticd.connect(f"Nobody@tcp://127.0.0.1:{server.port}", connect_timeout=0.3)
+    assert str(wrong.value).endswith("it has Phan\ufffd[2Jtom\ufffd")
+    number, layout = _NUMBERS[m.Text]
+    server.answer = frame(1700000000, 0, 0, number, layout.encode(m.Text(2, 0, "no\x1b[2J\x9b1m\nä\x7f")))
+    with hapticd.connect(server.name, throw_on_error=throws) as hand:
+        texts: List[str] = []
+        hand.on_text(lambda report: texts.append(report.text))
+        said = "no\ufffd[2J\ufffd1m\ufffdä\ufffd"
+        try:
+            until(hand, lambda: texts)
+        except hapticd.ServerError as error:
+            assert throws and str(error).endswith(said)
+        assert set(texts) == {said}
+    server.close()
+
+
 def test_a_connection_that_is_reset_before_it_is_used_is_tried_again() -> None:
     """By a server that connects, as VRPN's do, and is gone before the client polls."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/printable.h"
 #include "base/world.h"
 #include "client/client_impl.h"
 
@@ -29,7 +30,7 @@ std::string joined(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) {
     if (name == "VRPN Control") continue;
-    text += (text.empty() ? "" : ", ") + name;
+    text += (text.empty() ? "" : ", ") + base::printable(name);
   }
   return text.empty() ? "no other device" : text;
 }

@@ -136,6 +136,27 @@ refused 1 "is a pipe: copy it to a file first" "$hapticd" info <(cat "$recording
 for command in info replay "render --session" "plot --out $work/null.svg"; do
   refused 1 "'/dev/null' is a device, not a recording; 'hapticd serve --record FILE' writes one" "$hapticd" $command /dev/null
 done
+# What a recording says of itself does not reach the terminal as it is.
+python3 - "$recording" "$work/odd.haptics" <<'EOF'
+import struct, sys, zlib
+file = bytearray(open(sys.argv[1], "rb").read())
+head, end = file[8:16], 20 + struct.unpack(">I", file[12:16])[0]
+header = bytes(file[20:end])
+config = b"\x1b[2J\nx"
+offset = 8 + struct.unpack(">I", header[4:8])[0] + 8  # behind version, program and offset of the clock
+assert header[offset:offset + 4] == bytes(4)
+header = header[:offset + 3] + bytes([len(config)]) + config + header[offset + 4:]
+for said in (b"hapticd", b"Phantom", b"simulated"):
+    assert said in header
+    header = header.replace(said, b"\x1b[2J\n" + said[5:])
+head = head[:4] + struct.pack(">I", len(header))
+file[8:end] = head + struct.pack(">I", zlib.crc32(head + header)) + header
+open(sys.argv[2], "wb").write(file)
+EOF
+for command in "info --config" "render --session" "plot --force --out $work/odd.svg" "plot --device none --out $work/none.svg"; do
+  "$hapticd" $command "$work/odd.haptics" >"$work/said" 2>&1 || true
+  grep -q '�\[2J�' "$work/said" && ! grep -q $'\x1b' "$work/said" || { cat -v "$work/said"; echo "of: $command"; exit 1; }
+done
 mkfifo "$work/pipe.haptics"
 for file in /dev/full "$work/pipe.haptics"; do
   refused 1 "cannot record to '$file': it is a device or a pipe; name a file" "$hapticd" serve --listen 127.0.0.1:0 --http off --record "$file" --seconds 1

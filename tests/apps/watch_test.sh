@@ -38,6 +38,47 @@ for frame in frames:
     assert all(any(word in line for line in lines) for word in ("force", "|F|", "depth", "touching")), frame
 EOF
 
+# So does the bar of an upload on a narrow one.
+TERM=xterm script -qec "stty rows 24 cols 40; '$hapticd' touch '$source_dir/testdata/meshes/bunny.obj' --server Phantom@$address --seconds 1" \
+  /dev/null </dev/null >"$work/terminal"
+python3 - "$work/terminal" <<'EOF'
+import re, sys
+bars = re.findall(r"\r(sending[^\r\x1b]*)\x1b\[K", open(sys.argv[1], encoding="utf-8", newline="").read())
+assert bars and all(len(bar) < 40 and "[##" in bar and "100 %" in bar for bar in bars[-1:]), bars
+EOF
+
+# What a server repeats to a client that has caught up, also behind what it overtook, is one row.
+python3 - "$hapticd" "$work" <<'EOF'
+import csv, json, socket, struct, subprocess, sys, threading
+def frame(sender, kind, payload):
+    pad = lambda data: data + bytes(-len(data) % 8)
+    return pad(struct.pack(">iiiii", 24 + len(payload), 1700000000, 0, sender, kind)) + pad(payload)
+def description(kind, number, name):
+    return frame(number, kind, struct.pack(">i", len(name) + 1) + name.encode() + b"\0")
+types = ("hapticd Capabilities", "hapticd Tick", "vrpn_Base pong_message")
+first = b"vrpn: ver. 07.38  0".ljust(24, b"\0") + description(-1, 0, "Phantom")
+first += b"".join(description(-2, number, name) for number, name in enumerate(types))
+first += frame(0, 0, struct.pack(">iI3di6d", 1, 127, 1000, 1000, 3.3, 2, *6 * [0])) + frame(0, 2, b"")
+first += b"".join(frame(0, 1, struct.pack(">QqQ17diIII", tick, time, 1, *17 * [0], -1, 0, 0, 0))
+                  for tick, time in ((5, 1), (6, 2), (6, 2), (7, 3), (6, 2), (7, 3), (8, 4), (2, 5)))
+listener = socket.create_server(("127.0.0.1", 0))
+def serve():
+    while True:
+        link = listener.accept()[0]
+        link.sendall(first)
+        threading.Thread(target=lambda link=link: [None for _ in iter(lambda: link.recv(4096), b"")], daemon=True).start()
+threading.Thread(target=serve, daemon=True).start()
+name = f"Phantom@tcp://127.0.0.1:{listener.getsockname()[1]}"
+def run(*arguments):
+    return subprocess.run([sys.argv[1], *arguments, "--seconds", "1"], capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
+ticks = lambda rows: [int(row["tick"]) for row in rows]
+wanted = [5, 6, 7, 8, 2]  # 2: of a replay that began again
+assert ticks(csv.DictReader(run("watch", name, "--csv"))) == wanted
+assert ticks(map(json.loads, run("watch", name, "--json"))) == wanted
+run("record", name, sys.argv[2] + "/repeated.csv")
+assert ticks(csv.DictReader(open(sys.argv[2] + "/repeated.csv"))) == wanted
+EOF
+
 # A server without the extensions, with a tracker only: what it does not report is left empty, not zero.
 python3 - "$hapticd" <<'EOF'
 import socket, struct, subprocess, sys, threading

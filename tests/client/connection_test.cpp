@@ -160,6 +160,13 @@ TEST(Client, NoSuchDevice) {
   EXPECT_THAT(text, HasSubstr("it has Phantom"));
 }
 
+TEST(Client, NamesOfDevicesDoNotReachTheTerminalAsTheyAre) {
+  ScriptedServer server({.device = "Phan\x1b[2Jtom\n"});
+  const std::string text = textOf<ConnectError>(
+      [&] { Client("Phantm@tcp://127.0.0.1:" + std::to_string(server.port()), {.connectTimeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("it has Phan\xef\xbf\xbd[2Jtom\xef\xbf\xbd"));
+}
+
 TEST(Client, NotAVrpnServer) {
   ScriptedServer server({.greetingBytes = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"});
   const std::string text = textOf<ConnectError>([&] { Client(server.tcpName(), {.connectTimeout = 300ms}); });

@@ -585,12 +585,13 @@ TEST(VrpnLoopback, EachPrinterPrintsTheTextsOfItsDevices) {
   other.send_message("g", vrpn_TEXT_ERROR, 0);
   vrpn_System_TextPrinter.add_object(&other);
   vrpn_System_TextPrinter.set_min_level_to_print(vrpn_TEXT_NORMAL);
-  other.send_message("h", vrpn_TEXT_NORMAL, 0);
+  other.send_message("h\x1b[2J\n", vrpn_TEXT_NORMAL, 0);
   vrpn_System_TextPrinter.set_min_level_to_print(vrpn_TEXT_WARNING);
   std::fflush(stdout);
   EXPECT_EQ(::testing::internal::GetCapturedStdout(),
             "VRPN: warning of Stick: b\nVRPN: warning of Stick: c\nVRPN: error of Other: e\n"
-            "VRPN: error of Stick: f\nVRPN: message of Other: h\n");
+            "VRPN: error of Stick: f\nVRPN: message of Other: h\xef\xbf\xbd[2J\xef\xbf\xbd\n")
+      << "a terminal would obey";
   std::rewind(file);
   char text[200] = {};
   const std::size_t length = std::fread(text, 1, sizeof text, file);
@@ -1180,7 +1181,10 @@ TEST_F(VrpnFile, IsPlayedToADeviceThatOpensIt) {
   EXPECT_EQ(changes.size(), 4U);
   EXPECT_TRUE(file->eof());
   EXPECT_EQ(file->playone(), -1);
-  EXPECT_EQ(file->jump_to_time(2.0), 0);
+  EXPECT_EQ(file->jump_to_time(2.0), 1) << "as VRPN: it got there";
+  EXPECT_EQ(file->get_time().tv_sec, 102);
+  EXPECT_EQ(file->jump_to_time(99.0), 0) << "behind the last message";
+  EXPECT_EQ(file->jump_to_filetime({102, 0}), 1);
   EXPECT_EQ(file->playone(), 0);
   EXPECT_EQ(changes.back().button, 2);
   file->reset();
@@ -1239,23 +1243,35 @@ TEST_F(VrpnFile, IsClosedWhenAHandlerDeletesItsLastDevice) {
   EXPECT_EQ(vrpn_ConnectionManager::instance().getByName(name.c_str()), nullptr);
 }
 
-// However often mainloop() is called.
+// However often mainloop() is called. The clock runs on between its calls and those of the test.
 TEST_F(VrpnFile, IsPlayedAtItsRate) {
-  class Timed : public vrpn_File_Connection {
-   public:
-    using vrpn_File_Connection::vrpn_File_Connection;
-    timeval get_time() override { return now; }
-    timeval now{1700000000, 0};
+  const auto passed_ms = [](const timeval& from) {
+    timeval now{};
+    vrpn_gettimeofday(&now);
+    return vrpn_TimevalMsecs(vrpn_TimevalDiff(now, from));
   };
-  for (const float rate : {0.25F, 1.5F}) {
-    Timed file(("file:" + path_).c_str());
-    file.set_replay_rate(rate);
+  for (const double rate : {0.25, 1.5}) {
+    vrpn_File_Connection file(("file:" + path_).c_str());
+    file.set_replay_rate(static_cast<float>(rate));
+    timeval before{};
+    timeval after{};
+    vrpn_gettimeofday(&before);
     file.mainloop();
-    constexpr int kCalls = 100000;
-    for (file.now.tv_usec = 1; file.now.tv_usec < kCalls; ++file.now.tv_usec) file.mainloop();
+    vrpn_gettimeofday(&after);
+    double least_ms = 0;
+    do {
+      least_ms = passed_ms(after);
+      file.mainloop();
+    } while (least_ms < 100);
+    const double most_ms = passed_ms(before);
     timeval position{};
     file.time_since_connection_open(&position);
-    EXPECT_NEAR(vrpn_TimevalMsecs(position), 1e-3 * kCalls * static_cast<double>(rate), 0.01);
+    constexpr double kRounding_ms = 0.01;
+    EXPECT_GE(vrpn_TimevalMsecs(position), rate * least_ms - kRounding_ms);
+    EXPECT_LE(vrpn_TimevalMsecs(position), rate * most_ms + kRounding_ms);
+    EXPECT_EQ(vrpn_TimevalMsecs(vrpn_TimevalDiff(file.get_time(), file.get_lowest_user_timestamp())),
+              vrpn_TimevalMsecs(position))
+        << "its time is that of the file";
   }
 }
 

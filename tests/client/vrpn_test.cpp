@@ -860,6 +860,34 @@ TEST(VrpnQuat, VectorsAndMatrices) {
             "        10         10          0          1\n");
 }
 
+// The product of OpenGL's matrices of two poses is the matrix of the poses composed.
+TEST(VrpnQuat, MatricesOfOpenGl) {
+  q_xyz_quat_type a = {{1, 2, 3}, Q_ID_QUAT};
+  q_xyz_quat_type b = {{-4, 5, 0.5}, Q_ID_QUAT};
+  q_from_axis_angle(a.quat, 0, 1, 0, 0.7);
+  q_from_axis_angle(b.quat, 1, 2, -1, -1.1);
+  q_xyz_quat_type both;
+  q_xyz_quat_compose(&both, &a, &b);
+  qogl_matrix_type expected, product, second;
+  q_xyz_quat_to_ogl_matrix(expected, &both);
+  q_xyz_quat_to_ogl_matrix(product, &a);
+  q_xyz_quat_to_ogl_matrix(second, &b);
+  qogl_matrix_mult(product, product, second);
+  for (int i = 0; i < 16; ++i) EXPECT_NEAR(product[i], expected[i], 1e-12) << i;
+  qogl_matrix_copy(second, product);
+  EXPECT_EQ(second[13], product[13]);
+
+  qgl_matrix_type rows;
+  qgl_to_matrix(rows, a.quat);
+  const q_vec_type x = {1, 0, 0};
+  q_vec_type turned;
+  q_xform(turned, a.quat, x);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(static_cast<double>(rows[0][i]), turned[i], 1e-6) << "as rows";
+  q_type back;
+  qgl_from_matrix(back, rows);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(back[i], a.quat[i], 1e-6);
+}
+
 TEST(VrpnQuat, PosesComposeAndInvert) {
   q_xyz_quat_type a = {{1, 2, 3}, Q_ID_QUAT};
   q_from_axis_angle(a.quat, 0, 1, 0, 0.7);

@@ -36,6 +36,7 @@ typedef double q_type[4];
 typedef double q_vec_type[3];
 typedef double q_matrix_type[4][4];
 typedef double qogl_matrix_type[16];
+typedef float qgl_matrix_type[4][4];
 
 typedef struct q_xyz_quat_struct {
   q_vec_type xyz;
@@ -332,5 +333,45 @@ inline void q_ogl_matrix_to_xyz_quat(q_xyz_quat_type* to, const qogl_matrix_type
   memcpy(rows, m, sizeof rows);
   q_row_matrix_to_xyz_quat(to, rows);
 }
+
+// --- OpenGL: its products in the order in which it writes them, and row matrices of float
+
+inline void qogl_matrix_copy(qogl_matrix_type to, const qogl_matrix_type from) {
+  memmove(to, from, sizeof(qogl_matrix_type));
+}
+/// Of the points that the product moves, b moves them first.
+inline void qogl_matrix_mult(qogl_matrix_type to, const qogl_matrix_type a, const qogl_matrix_type b) {
+  q_matrix_type left, right, product;
+  memcpy(left, b, sizeof left);  // row matrices act in the reverse order
+  memcpy(right, a, sizeof right);
+  q_matrix_mult(product, left, right);
+  memcpy(to, product, sizeof product);
+}
+inline void qogl_print_matrix(const qogl_matrix_type m) {
+  for (int i = 0; i < 4; ++i) printf("%10g %10g %10g %10g\n", m[i], m[i + 4], m[i + 8], m[i + 12]);
+}
+inline void qgl_to_matrix(qgl_matrix_type to, const q_type q) {
+  q_matrix_type rows;
+  q_to_row_matrix(rows, q);
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) to[i][j] = static_cast<float>(rows[i][j]);
+  }
+}
+inline void qgl_from_matrix(q_type to, const qgl_matrix_type m) {
+  q_matrix_type rows;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) rows[i][j] = static_cast<double>(m[i][j]);
+  }
+  q_from_row_matrix(to, rows);
+}
+inline void qgl_print_matrix(const qgl_matrix_type m) {
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) printf("%10g%c", static_cast<double>(m[i][j]), j < 3 ? ' ' : '\n');
+  }
+}
+
+// Older names.
+#define q_set_vec q_vec_set
+#define qogl_matrix_mult_fixed qogl_matrix_mult
 
 #endif

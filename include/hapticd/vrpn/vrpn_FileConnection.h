@@ -28,6 +28,8 @@ class VRPN_API vrpn_File_Connection : public vrpn_Connection {
   virtual int mainloop(const struct timeval* timeout = NULL);
   /// The position in the file.
   virtual int time_since_connection_open(struct timeval* elapsed);
+  /// The same as a filetime.
+  virtual struct timeval get_time() { return position_; }
   virtual vrpn_File_Connection* get_File_Connection() { return this; }
 
   /// 0 pauses; negative rates are taken for 0.
@@ -45,7 +47,7 @@ class VRPN_API vrpn_File_Connection : public vrpn_Connection {
   int playone();
   /// The same: 1 at the end or when the next one is later than `filetime`.
   int playone_to_filetime(struct timeval filetime);
-  /// Continues there without playing what lies between. 1 when all messages are earlier.
+  /// Continues there without playing what lies between: 1, or 0 when all messages are earlier.
   int jump_to_time(vrpn_float64 seconds);
   int jump_to_time(struct timeval time);
   int jump_to_filetime(struct timeval filetime);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/printable.h"
 #include "client/vrpn/messages.h"
 #include "hapticd/vrpn/vrpn_Text.h"
 
@@ -30,6 +31,13 @@ std::mutex printing;
 
 constexpr int kSilenceWarning_s = 3;
 constexpr int kSilenceInterval_s = 10;
+
+// Of no connection: that of a file has the time of its messages.
+timeval wallTime() {
+  timeval now{};
+  vrpn_gettimeofday(&now);
+  return now;
+}
 
 }  // namespace
 
@@ -83,7 +91,7 @@ void vrpn_TextPrinter::print(const vrpn_BaseClassUnique* device, const vrpn_HAND
     if (m.severity < minimum || (m.severity == minimum && m.level < level_)) return;
     const char* kinds[] = {"message", "warning", "error"};
     fprintf(stream_, "VRPN: %s of %s: %s\n", kinds[std::min(m.severity, 2U)], device->d_servicename,
-            m.text.text.c_str());
+            hapticd::base::printable(m.text.text).c_str());
   });
 }
 
@@ -97,7 +105,7 @@ void vrpn_BaseClassUnique::open(const char* name, vrpn_Connection* connection) {
     d_connection = vrpn_get_connection_by_name(name);
   }
   if (!d_connection) return;
-  silentSince_ = d_connection->get_time();
+  silentSince_ = wallTime();
   d_sender_id = d_connection->registerDevice(d_servicename);
   if (d_sender_id < 0) {  // a name that is refused is none: the number stands for all devices
     std::exchange(d_connection, nullptr)->removeReference();
@@ -167,7 +175,7 @@ void vrpn_BaseClassUnique::client_mainloop() {
     sendMessage(d_connection, d_sender_id, wire::Ping{});
   }
   d_connection->mainloop();
-  const timeval now = d_connection->get_time();
+  const timeval now = wallTime();
   const bool heard = d_connection->heard(d_sender_id);
   if (heard) {
     silentSince_ = now;

@@ -85,7 +85,7 @@ bool vrpn_File_Connection::read() {
 int vrpn_File_Connection::mainloop(const timeval* timeout) {
   if (!ok_) return -1;
   if (timeout) vrpn_SleepMsecs(vrpn_TimevalMsecs(*timeout));
-  const timeval now = get_time();
+  const timeval now = vrpn_Connection::get_time();
   if (lastPlayed_.tv_sec == 0) lastPlayed_ = now;
   const timeval passed = vrpn_TimevalDiff(now, lastPlayed_);
   lastPlayed_ = now;
@@ -123,7 +123,7 @@ int vrpn_File_Connection::play_to_filetime(const timeval filetime) {
   while (playone_to_filetime(filetime) == 0) {
   }
   position_ = filetime;
-  lastPlayed_ = get_time();
+  lastPlayed_ = vrpn_Connection::get_time();
   return 0;
 }
 
@@ -139,7 +139,7 @@ int vrpn_File_Connection::jump_to_filetime(timeval filetime) {
   next_ = static_cast<std::size_t>(std::find_if(entries_.begin(), entries_.end(), later) - entries_.begin());
   position_ = filetime;
   lastPlayed_ = {};
-  return eof();
+  return eof() == 0 ? 1 : 0;
 }
 int vrpn_File_Connection::jump_to_time(timeval time) {
   return jump_to_filetime(vrpn_TimevalSum(get_lowest_user_timestamp(), time));
