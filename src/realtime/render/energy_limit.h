@@ -22,6 +22,7 @@ class EnergyLimit {
  private:
   double share_ = 1;
   bool open_ = false;  // what follows is of the last tick
+  bool whole_ = true;
   double stiffness_N_per_m_ = 0;
   double stored_J_ = 0;  // by what acted
   Vec3 force_N_ = Vec3::Zero();

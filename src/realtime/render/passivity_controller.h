@@ -23,6 +23,7 @@ struct SpringState {
   double pressed_N = 0;         ///< the contact force along it
   double stored_J = 0;
   double stiffness_N_per_m = 0;  ///< 0: nothing holds it
+  bool whole = true;             ///< false: the proxy is still on its way
   bool beside = false;           ///< another account counts what the arm dissipates without a hand
   /// Of springs and brake: what is more comes late.
   double most_N = std::numeric_limits<double>::infinity();

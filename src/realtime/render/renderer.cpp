@@ -57,6 +57,7 @@ SpringState restingSprings(const ContactSet& contactSet, bool changed, double to
   state.pressed_N = out.contactForce_N.dot(out.normal);
   state.stored_J = 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
   state.stiffness_N_per_m = kappa;
+  state.whole = (out.status & kRenderIterationLimit) == 0;
   return state;
 }
 

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 #include "meshes.h"
+#include "reduced.h"
 #include "scene_fixture.h"
 
 namespace hapticd::realtime::fixture {
@@ -74,6 +78,23 @@ TEST_F(EnergyLimitTest, A_share_ends_with_its_contact) {
   EXPECT_EQ(press(1e-3, 1000), 1);
 }
 
+// In the middle of a jump it may be nearer to the HIP than at its end, which is no farther than its begin.
+TEST_F(EnergyLimitTest, A_proxy_that_stopped_on_its_way_acts_wholly_where_it_arrives) {
+  const Vec3 hip = -1.56e-3 * Vec3::UnitZ();
+  SpringState onItsWay = floorAt(1.40e-3);
+  onItsWay.whole = false;
+  EXPECT_EQ(press(1.56e-3), 1);
+  EXPECT_EQ(limit.step(onItsWay, true, hip, kPeriod_s), 1);
+  EXPECT_EQ(limit.step(floorAt(1.52e-3), true, hip, kPeriod_s), 1);
+  EXPECT_LT(limit.step(floorAt(1.60e-3), true, hip, kPeriod_s), 0.92) << "it has arrived";
+}
+TEST_F(EnergyLimitTest, A_proxy_that_arrives_where_it_is_stiffer_stores_what_there_was) {
+  SpringState onItsWay = floorAt(4e-3, 100);
+  onItsWay.whole = false;
+  EXPECT_EQ(limit.step(onItsWay, true, -4e-3 * Vec3::UnitZ(), kPeriod_s), 1);
+  EXPECT_NEAR(press(4e-3, 1000), 0.1, 1e-9);
+}
+
 TEST_F(EnergyLimitTest, What_moves_or_a_command_stiffens_acts_wholly) {
   press(4e-3, 100);
   EXPECT_EQ(press(4e-3, 1000, false), 1);
@@ -127,6 +148,32 @@ TEST_F(EnergyShareTest, Commands_bring_their_energy_with_them) {
     ASSERT_EQ(hand.renderer().energyShare(), 1) << stiffness;
   }
   EXPECT_NEAR(hand.now().contactForce_N.norm(), 2, 1e-6);
+}
+
+// A ball that leaps from pit to pit may spend the casts of a tick on its way.
+TEST(EnergyShareOfOneStiffness, Is_whole_on_a_rough_body) {
+  constexpr double kBody_m = 0.01;
+  constexpr double kRadius_m = 0.002;
+  std::mt19937 dice(1);
+  std::uniform_real_distribution<float> roughness(0.97F, 1.03F);
+  TriangleMesh body = sphere(kBody_m, 30);
+  for (geometry::Vec3f& v : body.vertices) v *= roughness(dice);
+  SceneFixture scene;
+  scene.add(body, surface(1000));
+  Hand hand(scene.snapshot(), {.toolRadius_m = kRadius_m});
+  const auto direction = [](int tick) {
+    const double angle = 4e-3 * tick;  // 0.04 m/s
+    return Vec3(Eigen::AngleAxisd(0.2 * angle, Vec3::UnitX()) * Vec3(std::cos(angle), std::sin(angle), 0));
+  };
+  constexpr int kBegin = 4000;  // some 200 ticks before such a leap
+  hand.at((kBody_m + 2 * kRadius_m) * direction(kBegin));
+  int interrupted = 0;
+  for (int i = kBegin; i < kBegin + reduced(6000, 600); ++i) {
+    const Rendering& felt = hand.at(kBody_m * direction(i));
+    interrupted += (felt.status & kRenderIterationLimit) != 0 ? 1 : 0;
+    ASSERT_EQ(hand.renderer().energyShare(), 1) << "tick " << i << ", interrupted " << interrupted;
+  }
+  EXPECT_GT(interrupted, 0);
 }
 
 }  // namespace
