@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 
 #include "announce.h"
 #include "commands.h"
@@ -177,7 +179,10 @@ class CrashMark {
   }
   void set() const {
     if (file_.empty()) return;
-    const std::ofstream mark(file_);
+    errno = 0;
+    if (const std::ofstream mark(file_); !mark)
+      spdlog::warn("forces are not stopped after a crash: cannot create {}: {}", file_.string(),
+                   std::generic_category().message(errno));
   }
   bool crashed() const { return crashed_; }
   void endedInOrder() const {

@@ -220,8 +220,8 @@ class HAPTICD_EXPORT Client {
   ///
   /// Throws ConnectionLost without a connection, also when the server has ended it and nothing has been
   /// polled since. Throws ConnectError when the second connection is not confirmed within
-  /// ClientOptions::connectTimeout (at least 1 s); the stop on the first connection then still takes effect
-  /// when the server reads it.
+  /// ClientOptions::connectTimeout (at least 1 s), and up to 1 s later when the server does not answer its
+  /// end either; the stop on the first connection then still takes effect when the server reads it.
   void stopForces();
   /// Marks a moment, such as "trial 3 begins": the server records it and reports it to all clients. At most
   /// 255 bytes (std::invalid_argument). Sends at once, before it asks whether the server knows markers.

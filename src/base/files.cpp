@@ -142,8 +142,10 @@ void SystemFiles::createFolder(const std::filesystem::path& path) {
   std::error_code none;
   if (std::filesystem::is_directory(path, none)) return;
   if (path.has_relative_path() && path.has_parent_path()) createFolder(path.parent_path());
-  if (::mkdir(path.c_str(), 0755) == 0 || std::filesystem::is_directory(path, none)) return;
-  fail(errno == EEXIST ? ENOTDIR : errno, "cannot create", path);
+  if (::mkdir(path.c_str(), 0755) == 0) return;
+  const int reason = errno;
+  if (std::filesystem::is_directory(path, none)) return;
+  fail(reason == EEXIST ? ENOTDIR : reason, "cannot create", path);
 }
 
 std::vector<std::string> SystemFiles::list(const std::filesystem::path& folder) {

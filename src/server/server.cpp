@@ -111,8 +111,8 @@ net::Connection Server::secured(net::Connection connection) {
   if (isNear(connection.remote().address)) return connection;
   if (tls_) return tls::wrap(*tls_, std::move(connection));
   if (config_.insecure) return connection;
-  throttledLog_.warn("connection from " + connection.remote().text() +
-                     " refused: its network is not in trusted_networks, and tls is off");
+  throttledLog_.warnOfLasting("connection from " + connection.remote().addressText() +
+                              " refused: its network is not in trusted_networks, and tls is off");
   return {};
 }
 

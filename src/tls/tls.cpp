@@ -42,6 +42,7 @@ std::string reason() {
   // So OpenSSL names the first bytes of any other protocol.
   if (ERR_GET_LIB(code) == ERR_LIB_SSL && ERR_GET_REASON(code) == SSL_R_WRONG_VERSION_NUMBER)
     return "the peer speaks no TLS";
+  if (ERR_GET_REASON(code) == ERR_R_PEM_LIB) return "the file holds none in PEM, or one with a password";
   return text != nullptr ? text : "no reason given";
 }
 
@@ -120,6 +121,8 @@ Context Context::server(const std::string& certificateFile, const std::string& k
   impl->isServer = true;
   SSL_CTX* const context = impl->context.get();
   requirePrivate(keyFile);
+  // A server starts without a person: OpenSSL would ask on its terminal.
+  SSL_CTX_set_default_passwd_cb(context, [](char*, int, int, void*) { return -1; });
   if (SSL_CTX_use_certificate_chain_file(context, certificateFile.c_str()) != 1)
     throw Error("TLS: cannot use the certificate '" + certificateFile + "': " + reason());
   if (SSL_CTX_use_PrivateKey_file(context, keyFile.c_str(), SSL_FILETYPE_PEM) != 1 ||

@@ -13,10 +13,10 @@ manager.bind(work + "/notify")
 manager.settimeout(60)
 port = None
 
-def start():
+def start(runtime=work):
     log = open(work + "/log", "w")
     command = [hapticd, "serve", "--port", str(port or 0), "--http", "off", "--allow-no-rt"]
-    environment = {**os.environ, "NOTIFY_SOCKET": work + "/notify", "RUNTIME_DIRECTORY": work}
+    environment = {**os.environ, "NOTIFY_SOCKET": work + "/notify", "RUNTIME_DIRECTORY": runtime}
     return subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
 
 def await_state(state):
@@ -70,6 +70,15 @@ try:
     server.terminate()
     assert server.wait(60) == 0
     assert "did not end in order" not in open(work + "/log").read()
+    assert "after a crash" not in open(work + "/log").read()
+    # A mark that cannot be set is said: after a crash nothing would keep the forces stopped.
+    os.mkdir(work + "/full")
+    os.symlink("/dev/full/running", work + "/full/running")
+    server = start(work + "/full")
+    await_state(b"READY=1")
+    server.terminate()
+    assert server.wait(60) == 0
+    assert "forces are not stopped after a crash: cannot create" in open(work + "/log").read()
 finally:
     server.kill()
 PY

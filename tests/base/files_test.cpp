@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -184,6 +185,17 @@ TEST(SystemFiles, LetsNobodyElseWriteIntoFolders) {
     EXPECT_EQ(std::filesystem::status(disk.folder() / each).permissions(), std::filesystem::perms(0755))
         << each;
   }
+}
+
+// Of mkdir(), not of the look for a folder that follows.
+TEST(SystemFiles, SaysWhyAFolderCannotBeCreated) {
+  const char* const refused = "/sys/hapticd_test";
+  if (mkdir(refused, 0755) == 0) {
+    rmdir(refused);
+    GTEST_SKIP() << "/sys lets folders in";
+  }
+  const int reason = errno;
+  expectError([&] { SystemFiles().createFolder(refused); }, reason, refused);
 }
 
 // Linux has one file that is always full.

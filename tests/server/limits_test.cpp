@@ -91,5 +91,29 @@ TEST(Limits, LinesThatClientsCauseAreCountedBeyondTheirNumberAndTheirBytes) {
   EXPECT_EQ(log.count("a stranger"), 21U) << "in the next second";
 }
 
+// Such as a client that is refused and tries again four times a second, all night.
+TEST(Limits, ACauseThatLastsIsLoggedOnceAMinute) {
+  LogLines log;
+  server::ThrottledLog throttled;
+  const std::string cause = "connection from 10.0.0.5 refused: a reason";
+  const auto second = [&](int tries) {
+    for (int i = 0; i < tries; ++i) throttled.warnOfLasting(cause);
+    throttled.reportSuppressed();
+  };
+  for (int i = 0; i < 59; ++i) second(4);
+  EXPECT_EQ(log.count(cause), 1U) << log.text();
+  throttled.warnOfLasting("connection from 10.0.0.6 refused: a reason");
+  EXPECT_EQ(log.count("10.0.0.6"), 1U) << "each cause for itself";
+  second(4);
+  EXPECT_EQ(log.count(cause + " (239 more times in a minute)"), 1U) << log.text();
+  for (int i = 0; i < 60; ++i) second(1);
+  EXPECT_EQ(log.count(cause + " (60 more times in a minute)"), 1U) << log.text();
+  for (int i = 0; i < 60; ++i) second(0);
+  second(1);
+  EXPECT_EQ(log.count(cause), 4U) << "a quiet minute makes it new";
+  for (int i = 0; i < 10'000; ++i) throttled.warnOfLasting("connection from " + std::to_string(i));
+  EXPECT_LE(log.count("connection from "), 60U + 5U) << "the limits hold";
+}
+
 }  // namespace
 }  // namespace hapticd::test

@@ -188,5 +188,34 @@ TEST_F(TlsTest, KeysThatOthersMayReadAndWrongFilesAreRefused) {
   EXPECT_THROW(Context::clientThatKnows("12:34"), Error);
 }
 
+// Nobody is asked for a password: the server may have a terminal, and it starts without a person.
+TEST_F(TlsTest, AKeyWithAPasswordIsRefusedWithoutAQuestion) {
+  const fs::path certificate = certificateFor(0, 3600);
+  const fs::path key = fs::path(testing::TempDir()) / ("secret-" + std::to_string(getpid()) + ".pem");
+  const auto errorOf = [&] {
+    try {
+      Context::server(certificate, key);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string reason = "the file holds none in PEM, or one with a password";
+  std::ofstream(key) << "no key";
+  fs::permissions(key, fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_NE(errorOf().find(reason), std::string::npos) << errorOf();
+  EVP_PKEY* const secret = EVP_EC_gen("P-256");
+  std::FILE* const file = std::fopen(key.c_str(), "w");
+  std::string password = "secret";
+  PEM_write_PKCS8PrivateKey(file, secret, EVP_aes_256_cbc(), password.data(),
+                            static_cast<int>(password.size()), nullptr, nullptr);
+  std::fclose(file);
+  EVP_PKEY_free(secret);
+  EXPECT_NE(errorOf().find(reason), std::string::npos) << errorOf();
+  fs::remove(key);
+  fs::remove(certificate);
+  fs::remove(certificate.string() + ".key");
+}
+
 }  // namespace
 }  // namespace hapticd::tls

@@ -87,7 +87,11 @@ class Reader {
   void workspace(const std::string& key, std::vector<double>& out) {
     const toml::node* node = find(key);
     const char* expected = "\"device\", \"paper\" or six numbers";
-    if (node == nullptr || !node->is_string()) return takeList(key, out, expected);
+    if (node == nullptr || !node->is_string()) {
+      takeList(key, out, expected);
+      if (node != nullptr && out.empty()) fail(*node, key, expected);
+      return;
+    }
     const std::string choice = *node->value<std::string>();
     if (choice != "paper" && choice != "device") fail(*node, key, expected);
     out.clear();

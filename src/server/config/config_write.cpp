@@ -1,6 +1,7 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <sstream>
 
@@ -16,16 +17,23 @@ std::string text(double value) {
   return {digits, end};
 }
 
-// The shortest number of thousandths that reads back as the same value.
+// The shortest number of thousandths that reads back as the same value. Both products round, so it may be a
+// neighbour of `value` * 1e3.
 std::string thousandths(double value) {
-  char digits[32];
-  for (int precision = 15; precision < 17; ++precision) {
-    std::snprintf(digits, sizeof digits, "%.*g", precision, value * 1e3);
+  const auto readsBack = [value](const std::string& digits) {
     double back = 0;
-    std::from_chars(digits, digits + sizeof digits, back);
-    if (back * 1e-3 == value) return digits;
+    std::from_chars(digits.data(), digits.data() + digits.size(), back);
+    return back * 1e-3 == value;
+  };
+  const double product = value * 1e3;
+  for (int precision = 15; precision < 17; ++precision) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.*g", precision, product);
+    if (readsBack(digits)) return digits;
   }
-  return text(value * 1e3);
+  for (const double near : {std::nextafter(product, -HUGE_VAL), std::nextafter(product, HUGE_VAL)})
+    if (readsBack(text(near))) return text(near);
+  return text(product);
 }
 
 std::string quoted(const std::string& value) {

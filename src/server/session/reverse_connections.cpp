@@ -60,14 +60,14 @@ void ReverseConnections::onRequest(std::span<const std::byte> datagram, const ne
   const bool allowed =
       std::find(allowedHosts_.begin(), allowedHosts_.end(), request->host) != allowedHosts_.end();
   if (!sameHost && !allowed) {
-    log_.warn("connection request from " + from.text() + " names another host, " + client.text() +
-              ": refused; allow it with callback_hosts");
+    log_.warnOfLasting("connection request from " + from.addressText() + " names another host, " +
+                       client.text() + ": refused; allow it with callback_hosts");
     return;
   }
   if (!allowed && !allowsPlaintext_(client.address)) {
-    log_.warn("connection request from " + from.text() +
-              " refused: datagrams cannot be encrypted; use 'hapticd tunnel' on that machine, "
-              "trusted_networks or insecure");
+    log_.warnOfLasting("connection request from " + from.addressText() +
+                       " refused: datagrams cannot be encrypted; use 'hapticd tunnel' on that machine, "
+                       "trusted_networks or insecure");
     return;
   }
   connectTo(client, sourceOf(from.addressText()));

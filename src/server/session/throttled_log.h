@@ -35,7 +35,19 @@ class ThrottledLog {
   }
   /// A warning about a peer that is no client.
   void warn(const std::string& text) { log(spdlog::level::warn, {}, text); }
+  /// The same, of what lasts while the peer tries again and again: at once, then once a minute with the
+  /// number.
+  void warnOfLasting(const std::string& cause) {
+    const auto known = lasting_.find(cause);
+    if (known != lasting_.end()) {
+      ++known->second.times;
+      return;
+    }
+    if (lasting_.size() < kLasting) lasting_.emplace(cause, Lasting{});
+    warn(cause);
+  }
   void reportSuppressed() {
+    reportLasting();
     if (suppressed_ > 0)
       spdlog::warn("{} more lines about clients suppressed in the last second", suppressed_);
     bySource_.clear();
@@ -45,6 +57,30 @@ class ThrottledLog {
   }
 
  private:
+  static constexpr std::size_t kLasting = 1000;
+  static constexpr int kMinute_s = 60;
+
+  struct Lasting {
+    int seconds = 0;
+    std::uint64_t times = 0;
+  };
+
+  void reportLasting() {
+    for (auto each = lasting_.begin(); each != lasting_.end();) {
+      Lasting& lasting = each->second;
+      if (++lasting.seconds < kMinute_s) {
+        ++each;
+      } else if (lasting.times == 0) {
+        each = lasting_.erase(each);
+      } else {
+        warn(each->first + " (" + std::to_string(lasting.times) + " more times in a minute)");
+        lasting = {};
+        ++each;
+      }
+    }
+  }
+
+  std::map<std::string, Lasting> lasting_;
   std::size_t most_;
   std::size_t bytes_ = 0;
   std::map<std::string, int> bySource_;

@@ -129,6 +129,8 @@ TEST(Config, ErrorsNameLineKeyValueAndRemedy) {
             "test.toml:4: the name 'A' is used twice; device names must be unique");
   EXPECT_EQ(errorOf("[[device]]\nname=\"A@B\""),
             "test.toml:2: device name \"A@B\" must have 1 to 95 bytes, no '@' and no control characters");
+  EXPECT_THAT(errorOf("[[device]]\nworkspace=[]"),
+              HasSubstr("test.toml:2: 'workspace' is [], expected \"device\", \"paper\" or six numbers"));
   EXPECT_EQ(errorOf("[[device]]\nworkspace=[1,2,3]"),
             "test.toml:2: device 'Phantom': workspace needs six numbers in mm: min x y z, then max x y z, "
             "each min below its max");
@@ -493,6 +495,20 @@ TEST(Config, AWrittenConfigurationReadsBackEqual) {
   EXPECT_EQ(toToml(parseConfig(text, "written")), text);
   EXPECT_NE(text.find("linear_tolerance_mm = 0.3\n"), std::string::npos) << text;
   EXPECT_NE(text.find("workspace = \"paper\"\n"), std::string::npos) << text;
+}
+
+// Thousandths are stored as a product that rounds: the text is of a factor that gives the same one.
+TEST(Config, WrittenThousandthsReadBackEqual) {
+  for (const char* number :
+       {"31.3249868150241", "43.24931612966545", "25.267868904448388", "20.937448660194075",
+        "39.66989755440065", "1.9303672346150325", "28.31554444268709", "0.30000000000000004", "5e-324",
+        "1e-310", "49.999999999999993"}) {
+    const ServerConfig config =
+        parseConfig("[[device]]\ntool_radius_mm = " + std::string(number) + "\n", "test.toml");
+    const std::string text = toToml(config);
+    EXPECT_EQ(parseConfig(text, "written"), config) << number << "\n" << text;
+    EXPECT_EQ(toToml(parseConfig(text, "written")), text) << number;
+  }
 }
 
 // The test above relies on this to notice any key that is not written, not read, or confused with another.
