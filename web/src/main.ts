@@ -100,7 +100,10 @@ class Page {
     byId("ramp").style.background = rampCss();
     this.bindControls();
     this.showNotice();
-    pollState((state) => this.onState(state));
+    pollState(
+      (state) => this.onState(state),
+      () => this.meshes.deform,
+    );
     const servers = new ServersPanel(byId("servers"));
     pollServers((found) => servers.update(found));
     const frame = (time_ms: number): void => {
