@@ -336,6 +336,13 @@ TEST_F(Web, RefusesForeignNamesAndOriginsOnEveryPath) {
   EXPECT_EQ(get(web(), "/api/state").header("Access-Control-Allow-Origin"), "");
 }
 
+TEST_F(Web, ARequestWithoutANameOrWithTwoIsMalformed) {
+  const std::string host = "Host: " + web().text() + "\r\n";
+  for (const std::string& hosts : {std::string(), host + host}) {
+    EXPECT_EQ(ask(web(), "GET /healthz HTTP/1.1\r\nConnection: close\r\n" + hosts + "\r\n").status, 400);
+  }
+}
+
 TEST_F(Web, AWholeAddressIsJudgedByItsName) {
   const std::string rest = "/healthz HTTP/1.1\r\nConnection: close\r\nHost: ";
   EXPECT_EQ(ask(web(), "GET http://" + web().text() + rest + web().text() + "\r\n\r\n").status, 200);
