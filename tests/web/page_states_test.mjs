@@ -304,7 +304,9 @@ test("what changes all the time is not read aloud", async () => {
       return node.attributes[node.attributes.indexOf("id") + 1];
     }),
   );
-  assert.deepEqual(ids.sort(), ["hand-bar", "link", "toasts"]);
+  assert.deepEqual(ids.sort(), ["hand-bar", "held", "link", "toasts"]);
+  await viewer.page.click("#stop");
+  await viewer.until("STOPPED", async () => (await viewer.text("#held")) === "STOPPED");
   await end(viewer, server);
 });
 

@@ -465,6 +465,7 @@ class Page {
   /** Why there is no force, in letters that are read across a lab. */
   private showHeld(word: string): void {
     byId("stage").dataset["held"] = word;
+    setText(byId("held"), word); // screen readers read it, too
   }
 
   // Every frame.
