@@ -1,5 +1,6 @@
 #include "net/http_connection.h"
 
+#include <algorithm>
 #include <boost/beast/http/status.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <cctype>
@@ -18,6 +19,22 @@ std::string lowerCase(std::string_view text) {
   return lower;
 }
 
+// A target may be a whole address (RFC 9112, 3.2.2). Its name of the server then counts, not that of the Host
+// header, so that whoever judges the header judges that name.
+void takeWholeAddress(HttpRequest& request) {
+  const std::size_t colon = request.target.find("://");
+  if (colon == std::string::npos) return;
+  const std::string scheme = lowerCase(std::string_view(request.target).substr(0, colon));
+  if (scheme != "http" && scheme != "https") return;
+  const std::size_t begin = colon + 3;
+  const std::size_t end = std::min(request.target.find_first_of("/?", begin), request.target.size());
+  for (auto& [name, value] : request.headers) {
+    if (name == "host") value = request.target.substr(begin, end - begin);
+  }
+  request.target.erase(0, end);
+  if (!request.target.starts_with('/')) request.target.insert(0, 1, '/');
+}
+
 HttpRequest requestFrom(http::request<http::string_body>&& message) {
   HttpRequest request;
   request.method = std::string(message.method_string());
@@ -25,6 +42,7 @@ HttpRequest requestFrom(http::request<http::string_body>&& message) {
   for (const auto& field : message) {
     request.headers.emplace_back(lowerCase(field.name_string()), std::string(field.value()));
   }
+  takeWholeAddress(request);
   request.wantsWebSocket = boost::beast::websocket::is_upgrade(message);
   request.body = std::move(message.body());
   return request;
@@ -74,6 +92,7 @@ void HttpConnection::readOn() {
     parser_->header_limit(static_cast<std::uint32_t>(options_.headerBytes));
     parser_->body_limit(options_.bodyBytes);
     parser_->eager(true);
+    askedForBody_ = false;
     limit(options_.requestTimeout, "the request was not complete in time");
   }
   parse();
@@ -94,12 +113,26 @@ void HttpConnection::parse() {
     refuse(400, "malformed HTTP request: " + error.message());
   } else if (parser_->is_done()) {
     ask();
+  } else {
+    askForBody();
   }
+}
+
+// A client may wait with the body until it is told that it is wanted.
+void HttpConnection::askForBody() {
+  const auto& message = parser_->get();
+  if (askedForBody_ || !parser_->is_header_done() || message.version() < 11) return;
+  askedForBody_ = true;
+  if (lowerCase(message[http::field::expect]) != "100-continue") return;
+  constexpr std::string_view kGo = "HTTP/1.1 100 Continue\r\n\r\n";
+  connection_.send(std::as_bytes(std::span(kGo)));
+  connection_.flush();
 }
 
 void HttpConnection::ask() {
   state_ = State::answering;
   keepAlive_ = parser_->keep_alive();
+  old_ = parser_->get().version() < 11;
   HttpRequest request = requestFrom(parser_->release());
   parser_.reset();
   // Of another coding the parser does not know where the body ends, and would take it for the next request.
@@ -150,7 +183,10 @@ void HttpConnection::sendHead(const HttpResponse& response) {
   head += "\r\nContent-Type: " + response.contentType;
   head += "\r\nContent-Length: " + std::to_string(response.body ? response.body->size() : 0);
   for (const auto& [name, value] : response.headers) head += "\r\n" + name + ": " + value;
-  head += keepAlive_ ? "\r\n\r\n" : "\r\nConnection: close\r\n\r\n";
+  // Of HTTP/1.1 the connection stays, of HTTP/1.0 it ends, unless the answer says so.
+  if (!keepAlive_) head += "\r\nConnection: close";
+  if (keepAlive_ && old_) head += "\r\nConnection: keep-alive";
+  head += "\r\n\r\n";
   connection_.send(std::as_bytes(std::span(head)));
 }
 

@@ -34,6 +34,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void receive(std::span<const std::byte> bytes);
   void readOn();
   void parse();
+  void askForBody();
   void ask();
   void refuse(int status, std::string_view text);
   void sendHead(const HttpResponse& response);
@@ -56,6 +57,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::uint64_t request_ = 0;
   bool headOnly_ = false;
   bool keepAlive_ = false;
+  bool old_ = false;  // HTTP/1.0
+  bool askedForBody_ = false;
   std::shared_ptr<const Buffer> body_;
   std::size_t bodySent_ = 0;
 };

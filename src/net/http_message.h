@@ -14,8 +14,8 @@
 namespace hapticd::net {
 
 struct HttpRequest {
-  std::string method;                                        ///< as sent: "GET"
-  std::string target;                                        ///< as sent: "/api/mesh?scene=0"
+  std::string method;  ///< as sent: "GET"
+  std::string target;  ///< "/api/mesh?scene=0"; of "http://HOST/x" its "/x"
   std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case, in order of arrival
   std::string body;
   Endpoint local;

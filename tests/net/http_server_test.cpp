@@ -135,6 +135,81 @@ TEST(HttpServer, AnOldClientIsAnsweredAndLeft) {
   EXPECT_THAT(http.ask("GET / HTTP/1.0\r\n\r\n"), HasSubstr("Connection: close\r\n\r\nGET /"));
 }
 
+// Without the header such a client waits for the end of the connection.
+TEST(HttpServer, AnOldClientThatMayStayIsToldSo) {
+  Http http;
+  RawSocket peer = http.join();
+  const std::string answer =
+      "HTTP/1.1 200 OK\r\nContent-Type: text/plain; charset=utf-8\r\nContent-Length: 5\r\n"
+      "Connection: keep-alive\r\n\r\nGET /";
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(peer.send("GET / HTTP/1.0\r\nConnection: Keep-Alive\r\n\r\n"));
+    EXPECT_EQ(http.receive(peer, answer.size()), answer);
+  }
+}
+
+// RFC 9112, 3.2.2: such a target names the server, and the Host header does not count.
+TEST(HttpServer, ATargetMayBeAWholeAddress) {
+  Http http;
+  struct Case {
+    const char* sent;
+    const char* target;
+    const char* host;
+  };
+  for (const Case& c : {Case{"http://here:80/a/b?c=http://d/", "/a/b?c=http://d/", "here:80"},
+                        Case{"HTTP://here", "/", "here"}, Case{"https://here?c=1", "/?c=1", "here"},
+                        Case{"http:///a", "/a", ""}, Case{"http://here:80@there/", "/", "here:80@there"},
+                        Case{"/http://there/", "/http://there/", "other"},
+                        Case{"ftp://here/", "ftp://here/", "other"}, Case{"*", "*", "other"}}) {
+    http.requests.clear();
+    http.ask(std::string("GET ") + c.sent + " HTTP/1.1\r\nHost: other\r\nConnection: close\r\n\r\n");
+    ASSERT_EQ(http.requests.size(), 1u) << c.sent;
+    EXPECT_EQ(http.requests.front().target, c.target);
+    EXPECT_EQ(http.requests.front().header("host"), c.host) << c.sent;
+    EXPECT_EQ(http.requests.front().count("host"), 1u);
+  }
+  http.requests.clear();
+  http.ask("GET http://here/ HTTP/1.1\r\nConnection: close\r\n\r\n");
+  http.ask("GET http://here/ HTTP/1.1\r\nHost: here\r\nHost: here\r\nConnection: close\r\n\r\n");
+  ASSERT_EQ(http.requests.size(), 2u);
+  EXPECT_EQ(http.requests[0].count("host"), 0u) << "a missing one stays missing";
+  EXPECT_EQ(http.requests[1].count("host"), 2u);
+}
+
+TEST(HttpServer, WhoAsksBeforeTheBodyIsTold) {
+  Http http;
+  const std::string go = "HTTP/1.1 100 Continue\r\n\r\n";
+  RawSocket peer = http.join();
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(
+        peer.send("POST / HTTP/1.1\r\nHost: here\r\nExpect: 100-Continue\r\nContent-Length: 4\r\n\r\n"));
+    EXPECT_EQ(http.receive(peer, go.size()), go);
+    EXPECT_EQ(http.requests.size(), static_cast<std::size_t>(i));
+    ASSERT_TRUE(peer.send("bo"));
+    http.loop.runOnce(1ms);
+    ASSERT_TRUE(peer.send("dy"));
+    EXPECT_EQ(
+        http.receive(peer, kAnswer.size() + 1),
+        "HTTP/1.1 200 OK\r\nContent-Type: text/plain; charset=utf-8\r\nContent-Length: 6\r\n\r\nPOST /");
+    ASSERT_EQ(http.requests.size(), static_cast<std::size_t>(i) + 1);
+    EXPECT_EQ(http.requests.back().body, "body");
+  }
+  const std::string chunked =
+      "Expect: 100-continue\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n";
+  EXPECT_THAT(http.ask("POST / HTTP/1.1\r\n" + chunked + "1\r\nx\r\n0\r\n\r\n"), HasSubstr("\r\n\r\nPOST /"));
+  EXPECT_THAT(http.ask("POST / HTTP/1.1\r\nExpect: 100-continue\r\nContent-Length: 5000\r\n\r\n"),
+              StartsWith("HTTP/1.1 413 "))
+      << "the body is not asked for";
+  EXPECT_THAT(http.ask("GET / HTTP/1.1\r\nExpect: 100-continue\r\nConnection: close\r\n\r\n"),
+              StartsWith("HTTP/1.1 200 "))
+      << "there is none";
+  RawSocket old = http.join();
+  ASSERT_TRUE(old.send("POST / HTTP/1.0\r\nExpect: 100-continue\r\nContent-Length: 1\r\n\r\n"));
+  for (int i = 0; i < 5; ++i) http.loop.runOnce(1ms);
+  ASSERT_TRUE(old.send("x"));
+  EXPECT_THAT(http.receiveAll(old), StartsWith("HTTP/1.1 200 "));
+}
+
 TEST(HttpServer, ABodyIsGiven) {
   Http http;
   http.ask("POST / HTTP/1.1\r\nHost: here\r\nConnection: close\r\nContent-Length: 4\r\n\r\nbody");

@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { launch, Viewer } from "./browser.mjs";
-import { Server, until } from "./server.mjs";
+import { pause, Server, until } from "./server.mjs";
 
 const [hapticd] = process.argv.slice(2);
 const folder = await mkdtemp(join(tmpdir(), "hapticd-states-"));
@@ -249,6 +249,117 @@ test("no force is drawn after the connection was lost", async () => {
   await viewer.until("the notice", async () => (await viewer.text("#link")) === "lost");
   assert.equal(await drawn(), 1, "the workspace");
   await viewer.page.close();
+});
+
+test("no line of a plot joins what was measured before and after a gap", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const gaps = () => viewer.ask("[viewer.plots.force, viewer.plots.latency].map((p) => p.plot.series[1]._paths?.gaps.length)");
+  await viewer.until("a line", async () => (await gaps()).every((n) => n === 0));
+  await server.stop();
+  await viewer.until("the notice", async () => (await viewer.text("#link")) === "lost");
+  await pause(1000);
+  const next = await Server.start(hapticd, { http: new URL(server.url).host });
+  await viewer.until("two lines", async () => (await gaps()).every((n) => n === 1));
+  // A machine that starts anew counts its time from 0: all samples of before would lie in the future.
+  await viewer.ask(`(() => {
+    const { plots } = viewer;
+    plots.tick({ ...plots.newest, time_ns: plots.newest.time_ns + 1e12 }, 0, 0, 0);
+    plots.marker(plots.newest.time_ns / 1e9, "of before");
+  })()`);
+  await viewer.until("only new samples", () => viewer.ask(`(() => {
+    const [time] = viewer.plots.force.window.data();
+    return time.length > 5 && time.every((t, i) => i === 0 || t >= time[i - 1]) && viewer.plots.marks.length === 0;
+  })()`));
+  await end(viewer, next);
+});
+
+test("where the browser stores nothing, the page works", async () => {
+  const server = await Server.start(hapticd);
+  const page = await browser.context.newPage();
+  await page.addInitScript(`for (const store of ["localStorage", "sessionStorage"])
+    Object.defineProperty(window, store, { get() { throw new DOMException("denied", "SecurityError"); } });`);
+  await page.goto(server.url);
+  await until("the connection", async () => (await page.innerText("#link")) === "connected");
+  await page.click("#theme");
+  assert.equal(await page.innerText("#theme"), "Light");
+  await page.fill("#token-text", "0123456789abcdef");
+  await page.press("#token-text", "Enter");
+  await page.click("#stop");
+  await until("the stop", async () => (await server.state()).devices[0].guard.stopped);
+  await page.close();
+  await server.stop();
+});
+
+test("what changes all the time is not read aloud", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.until("a plot", async () => (await viewer.text("[data-plot=Latency] output")).includes("ms"));
+  const session = await browser.context.newCDPSession(viewer.page);
+  const { nodes } = await session.send("Accessibility.getFullAXTree");
+  const live = nodes.filter((n) => n.properties?.some((p) => p.name === "live" && p.value.value !== "off"));
+  const ids = await Promise.all(
+    live.map(async ({ backendDOMNodeId }) => {
+      const { node } = await session.send("DOM.describeNode", { backendNodeId: backendDOMNodeId });
+      return node.attributes[node.attributes.indexOf("id") + 1];
+    }),
+  );
+  assert.deepEqual(ids.sort(), ["hand-bar", "held", "link", "toasts"]);
+  await viewer.page.click("#stop");
+  await viewer.until("STOPPED", async () => (await viewer.text("#held")) === "STOPPED");
+  await end(viewer, server);
+});
+
+test("keys of the browser do not move the hand, and steps out of the workspace need no steps back", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const x = () => viewer.ask("viewer.hand.target.x");
+  await viewer.page.focus("#view");
+  for (const modifier of ["Alt", "Control", "Meta"])
+    assert.equal(
+      await viewer.ask(`document.querySelector("#view").dispatchEvent(
+        new KeyboardEvent("keydown", { key: "ArrowLeft", ${modifier === "Control" ? "ctrl" : modifier.toLowerCase()}Key: true, cancelable: true }))`),
+      true,
+      modifier,
+    );
+  assert.equal(await viewer.ask("viewer.hand.held"), false);
+  for (let i = 0; i < 60; ++i) await viewer.page.keyboard.press("Shift+ArrowRight");
+  const end_mm = await viewer.ask("viewer.device.workspace_m.max[0] * 1000");
+  assert.ok(Math.abs((await x()) - end_mm) < 1e-6, `${await x()}`);
+  await viewer.page.keyboard.press("Shift+ArrowLeft");
+  assert.ok((await x()) < end_mm - 5, `${await x()}`);
+  await viewer.page.keyboard.press("l");
+  await end(viewer, server);
+});
+
+test("of two fingers, both move the camera and none the hand", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const session = await browser.context.newCDPSession(viewer.page);
+  const { x, y } = await viewer.ask(`(() => {
+    const { left, top, width, height } = document.querySelector("#view").getBoundingClientRect();
+    return { x: left + width / 2, y: top + height / 2 };
+  })()`);
+  const touch = (type, ...points) =>
+    session.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([dx, dy], id) => ({ x: x + dx, y: y + dy, id })) });
+  const target = () => viewer.ask("viewer.hand.target.toArray()");
+  const away = () => viewer.ask("viewer.view.camera.position.distanceTo(viewer.view.controls.target)");
+  await touch("touchStart", [0, 0]);
+  for (let i = 1; i <= 5; ++i) await touch("touchMove", [10 * i, 0]);
+  await viewer.until("the hand", () => viewer.ask(`viewer.hand.held && !viewer.hand.aimPending && viewer.hand.pointer.x > ${x} + 45`));
+  const before = await target();
+  const from = await away();
+  await touch("touchStart", [50, 0], [-100, 0]);
+  for (let i = 1; i <= 5; ++i) await touch("touchMove", [50 + 10 * i, 0], [-100 - 10 * i, 0]);
+  await viewer.until("a nearer camera", async () => (await away()) < 0.95 * from);
+  assert.ok((await away()) > 0.4 * from, `from ${from} to ${await away()}`);
+  await touch("touchEnd", [100, 0]);
+  await touch("touchMove", [120, 30]);
+  await touch("touchEnd");
+  assert.deepEqual(await target(), before);
+  assert.equal(await viewer.ask("viewer.hand.held && !viewer.hand.dragging"), true);
+  await viewer.letGo();
+  await end(viewer, server);
 });
 
 test("a page of a replay moves the hand of the live server that follows", async () => {

@@ -41,6 +41,8 @@ export class Hand {
   /** Whether the left mouse button moves the hand. */
   enabled = true;
   private dragging = false;
+  /** The finger, or the mouse, that drags. */
+  private pointerId = -1;
   private ignoredUntilUp = false;
   private press_mm = PRESS_MM;
   private pointer = { x: 0, y: 0 };
@@ -63,10 +65,11 @@ export class Hand {
     private readonly onChange: () => void,
   ) {
     const { canvas } = view;
-    canvas.addEventListener("pointerdown", (e) => this.down(e));
+    // Before the camera: it asks whether it may zoom.
+    canvas.addEventListener("pointerdown", (e) => this.down(e), { capture: true });
     canvas.addEventListener("pointermove", (e) => this.move(e));
-    canvas.addEventListener("pointerup", () => this.up());
-    canvas.addEventListener("pointercancel", () => this.up());
+    canvas.addEventListener("pointerup", (e) => this.up(e));
+    canvas.addEventListener("pointercancel", (e) => this.up(e));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
     // Not with the frames: a hidden page has none.
@@ -108,11 +111,13 @@ export class Hand {
   }
 
   private down(e: PointerEvent): void {
+    if (!e.isPrimary) return this.stay(); // two fingers move the camera
     if (e.button !== 0 || !this.enabled) return;
     const context = this.context();
     if (!context) return;
     this.view.canvas.setPointerCapture(e.pointerId);
     this.dragging = true;
+    this.pointerId = e.pointerId;
     this.view.zooming = false;
     this.pointer = { x: e.clientX, y: e.clientY };
     if (!this.held) this.take(context);
@@ -130,12 +135,18 @@ export class Hand {
   }
 
   private move(e: PointerEvent): void {
-    if (!this.dragging || !this.held) return;
+    if (!this.dragging || !this.held || e.pointerId !== this.pointerId) return;
     this.pointer = { x: e.clientX, y: e.clientY };
     this.aimPending = true;
   }
 
-  private up(): void {
+  private up(e: PointerEvent): void {
+    if (e.pointerId === this.pointerId) this.stay();
+  }
+
+  /** The drag ends; the hand stays where it is. */
+  private stay(): void {
+    if (this.held && this.aimPending) this.aim(); // before the camera moves
     this.dragging = this.ignoredUntilUp = false;
     this.view.zooming = true;
   }
@@ -147,6 +158,7 @@ export class Hand {
   }
 
   private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey) return; // keys of the browser
     const context = this.context();
     const direction = KEYS[e.key];
     if (!direction || !context || !this.enabled) return;
@@ -156,6 +168,7 @@ export class Hand {
     const step = KEY_MM * context.worldPerMm * (e.shiftKey ? 5 : 1);
     this.target.addScaledVector(right, direction[0] * step).addScaledVector(up, direction[1] * step);
     if (direction[2] !== 0) this.target.addScaledVector(this.view.axes().into, direction[2] * step);
+    this.keepInside(context.surroundings);
     this.noteUse();
   }
 
@@ -177,9 +190,15 @@ export class Hand {
       this.aim();
     } else {
       this.target.addScaledVector(this.view.axes().into, mm * context.worldPerMm);
+      this.keepInside(context.surroundings);
     }
     this.noteUse();
     this.onChange();
+  }
+
+  // As the server does: of steps that led outside, the first one back moves the hand.
+  private keepInside({ workspace, T_world_device }: Surroundings): void {
+    this.target.applyMatrix4(T_world_device.clone().invert()).clamp(workspace.min, workspace.max).applyMatrix4(T_world_device);
   }
 
   // Sets the target to the surface below the pointer, or to the plane through the target that faces the camera.

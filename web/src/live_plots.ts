@@ -9,6 +9,8 @@ import { byId, countText, setText } from "./panels/dom";
 
 const SECONDS = 10;
 const LOOP_SECONDS = 60;
+/** States come more often while meshes deform. */
+const LEAST_PERIOD_S = 0.2;
 /** 10 s of ticks at 125 Hz, with a margin. */
 const MAX_SAMPLES = 1400;
 
@@ -29,6 +31,7 @@ export class LivePlots {
   private before: Histogram | undefined;
   private newest: Tick | undefined;
   private meanSince: Tick | undefined;
+  private periodAt_s = -Infinity;
   private turn = 0;
   private readonly marks: Mark[] = [];
   /** Of the newest tick; those of the first one began before. */
@@ -74,6 +77,7 @@ export class LivePlots {
   }
 
   tick(tick: Tick, force_N: number, depth_mm: number, latency_ms: number): void {
+    if (this.newest && tick.time_ns < this.newest.time_ns) this.restart();
     this.newest = tick;
     const time_s = tick.time_ns / 1e9;
     this.force.push(time_s, force_N);
@@ -91,7 +95,14 @@ export class LivePlots {
   clear(): void {
     for (const plot of this.timed) plot.clear();
     this.marks.splice(0, Infinity, ...this.marks.filter((mark) => mark.colour !== TRIP_COLOUR));
+    this.periodAt_s = -Infinity;
     this.trips = this.before = this.newest = this.meanSince = undefined;
+  }
+
+  /** The server's machine started anew: all times of before lie in the future. */
+  private restart(): void {
+    this.clear();
+    this.marks.length = 0;
   }
 
   /** Nothing is known any more. */
@@ -166,6 +177,8 @@ export class LivePlots {
   }
 
   state(device: DeviceState, time_s: number): void {
+    if (time_s - this.periodAt_s < LEAST_PERIOD_S) return;
+    this.periodAt_s = time_s;
     const now = device.loop.period_us;
     const since = between(this.before, now);
     const mean_us = this.mean_us();

@@ -100,7 +100,10 @@ class Page {
     byId("ramp").style.background = rampCss();
     this.bindControls();
     this.showNotice();
-    pollState((state) => this.onState(state));
+    pollState(
+      (state) => this.onState(state),
+      () => this.meshes.deform,
+    );
     const servers = new ServersPanel(byId("servers"));
     pollServers((found) => servers.update(found));
     const frame = (time_ms: number): void => {
@@ -462,6 +465,7 @@ class Page {
   /** Why there is no force, in letters that are read across a lab. */
   private showHeld(word: string): void {
     byId("stage").dataset["held"] = word;
+    setText(byId("held"), word); // screen readers read it, too
   }
 
   // Every frame.

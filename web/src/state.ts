@@ -2,6 +2,8 @@
 import type { ObjectState, ServerState } from "./state_types";
 
 const EVERY_MS = 250;
+/** While meshes deform. */
+const EVERY_DEFORMING_MS = 60;
 /** Without a server: each failed request is a line in the browser's console. */
 const EVERY_LOST_MS = 2000;
 const RETRY_MS = 1000;
@@ -27,8 +29,12 @@ export function decodeMesh(bytes: ArrayBuffer): DisplayMesh {
   };
 }
 
-/** Calls back with each new state; `undefined` when the server does not respond. */
-export function pollState(onState: (state: ServerState | undefined) => void): void {
+/** Calls back with each new state; `undefined` when the server does not respond. The next one comes soon once `deforms` is true. */
+export function pollState(onState: (state: ServerState | undefined) => void, deforms: () => boolean): void {
+  const next = (wait_ms: number): void => {
+    const step_ms = Math.min(wait_ms, EVERY_DEFORMING_MS);
+    window.setTimeout(() => void (wait_ms === step_ms || deforms() ? poll() : next(wait_ms - step_ms)), step_ms);
+  };
   const poll = async (): Promise<void> => {
     let state: ServerState | undefined;
     try {
@@ -40,7 +46,8 @@ export function pollState(onState: (state: ServerState | undefined) => void): vo
     try {
       onState(state);
     } finally {
-      window.setTimeout(() => void poll(), state ? EVERY_MS : EVERY_LOST_MS);
+      if (state) next(EVERY_MS);
+      else window.setTimeout(() => void poll(), EVERY_LOST_MS);
     }
   };
   void poll();
@@ -53,11 +60,18 @@ export class Meshes {
   private notBefore_ms = 0;
   private scene = 0;
   private objects: ObjectState[] = [];
+  /** A known mesh had another shape in the last state. */
+  private changed = false;
 
   constructor(
     private readonly onMesh: (object: number, mesh: DisplayMesh) => void,
     private readonly onGone: (object: number) => void,
   ) {}
+
+  /** Whether meshes deform, and the last shape has come: a state before would make the request void. */
+  get deform(): boolean {
+    return this.changed && !this.request;
+  }
 
   clear(): void {
     for (const id of this.have.keys()) this.onGone(id);
@@ -71,6 +85,7 @@ export class Meshes {
   update(scene: number, objects: ObjectState[]): void {
     this.scene = scene;
     this.objects = objects;
+    this.changed = objects.some((o) => (this.have.get(o.id) ?? keyOf(o, 0)).split("/")[0] !== String(o.geometry));
     const withMesh = new Set(objects.filter((o) => o.triangles > 0).map((o) => o.id));
     for (const id of [...this.have.keys()]) {
       if (withMesh.has(id)) continue;
@@ -87,7 +102,7 @@ export class Meshes {
       void this.fetch(this.scene, missing, detailLevel);
   }
 
-  // 503: still being simplified; 404: no longer there. A later state triggers the next attempt.
+  // 503: still being simplified; 404: no longer there, or of another shape by now. A later state triggers the next attempt.
   private async fetch(scene: number, object: ObjectState, detailLevel: number): Promise<void> {
     const request = (this.request = new AbortController());
     const { signal } = request;
@@ -96,7 +111,7 @@ export class Meshes {
       const url = `/api/mesh?scene=${scene}&object=${object.id}&geometry=${object.geometry}`;
       const response = await fetch(url, { signal });
       if (response.status !== 200) {
-        this.notBefore_ms = performance.now() + RETRY_MS;
+        if (response.status !== 404) this.notBefore_ms = performance.now() + RETRY_MS;
         return;
       }
       const mesh = decodeMesh(await response.arrayBuffer());

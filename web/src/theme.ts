@@ -1,5 +1,6 @@
 // Light or dark theme: the preference of the system until the user chooses.
 import { byId, setText } from "./panels/dom";
+import { keep, stored } from "./stored";
 
 type Theme = "light" | "dark";
 const KEY = "hapticd-theme";
@@ -7,7 +8,8 @@ const KEY = "hapticd-theme";
 export function startTheme(onChange: () => void): void {
   const system = matchMedia("(prefers-color-scheme: dark)");
   const button = byId("theme");
-  const chosen = (): Theme | null => localStorage.getItem(KEY) as Theme | null;
+  let here: Theme | null = null; // where nothing can be stored
+  const chosen = (): Theme | null => (stored("localStorage", KEY) as Theme | null) ?? here;
   const apply = (): void => {
     const theme = chosen() ?? (system.matches ? "dark" : "light");
     document.documentElement.dataset["theme"] = theme;
@@ -15,7 +17,8 @@ export function startTheme(onChange: () => void): void {
     onChange();
   };
   button.addEventListener("click", () => {
-    localStorage.setItem(KEY, document.documentElement.dataset["theme"] === "dark" ? "light" : "dark");
+    here = document.documentElement.dataset["theme"] === "dark" ? "light" : "dark";
+    keep("localStorage", KEY, here);
     apply();
   });
   system.addEventListener("change", apply);

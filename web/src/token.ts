@@ -2,6 +2,7 @@
 // program, which may undo its own stop. Both stay in this tab: no other tab, no cookie, nothing in the address.
 import { toast } from "./notice";
 import { byId } from "./panels/dom";
+import { forget, keep, stored } from "./stored";
 import { type Outgoing, identify } from "./wire";
 
 const KEY = "hapticd token";
@@ -20,31 +21,29 @@ function randomKey(): number {
 }
 
 let keyOfPage = 0;
+/** The token where the browser stores nothing. */
+let tokenHere = "";
 
 /** That of the tab: a page that was loaded again is the program that it was. */
 function programKey(): number {
   if (keyOfPage !== 0) return keyOfPage;
-  const stored = Number(sessionStorage.getItem(PROGRAM_KEY));
-  keyOfPage = Number.isSafeInteger(stored) && stored > 0 ? stored : randomKey();
-  sessionStorage.removeItem(PROGRAM_KEY);
+  const before = Number(stored("sessionStorage", PROGRAM_KEY));
+  keyOfPage = Number.isSafeInteger(before) && before > 0 ? before : randomKey();
+  forget("sessionStorage", PROGRAM_KEY);
   window.addEventListener("pagehide", storeKey);
-  window.addEventListener("pageshow", () => sessionStorage.removeItem(PROGRAM_KEY));
+  window.addEventListener("pageshow", () => forget("sessionStorage", PROGRAM_KEY));
   return keyOfPage;
 }
 
 /** Only from one page of the tab to the next: a browser that duplicates a tab copies what the tab stores, and a copy beside this page
  * is another program. */
 function storeKey(): void {
-  try {
-    sessionStorage.setItem(PROGRAM_KEY, String(keyOfPage));
-  } catch {
-    // The browser stores nothing: the next page of this tab is another program.
-  }
+  keep("sessionStorage", PROGRAM_KEY, String(keyOfPage)); // or the next page of this tab is another program
 }
 
 /** What a new connection sends first. */
 export function credentials(): Outgoing[] {
-  const token = sessionStorage.getItem(KEY) ?? "";
+  const token = stored("sessionStorage", KEY) ?? tokenHere;
   return [identify(isToken(token) ? token : "", programKey())];
 }
 
@@ -55,10 +54,11 @@ export function bindToken(send: (...messages: Outgoing[]) => void): void {
     e.preventDefault();
     const token = field.value.trim();
     field.value = "";
-    sessionStorage.removeItem(KEY);
+    forget("sessionStorage", KEY);
+    tokenHere = "";
     if (token === "") return;
     if (!isToken(token)) return toast("Not a token: it has 16 to 128 characters.", 2);
-    sessionStorage.setItem(KEY, token);
+    if (!keep("sessionStorage", KEY, token)) tokenHere = token;
     send(...credentials());
   });
 }

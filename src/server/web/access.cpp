@@ -49,7 +49,8 @@ bool WebAccess::isOurs(std::string_view authority, std::string_view portOfScheme
 std::string WebAccess::refusal(const net::HttpRequest& request) const {
   if (request.count("host") != 1) return "a request must have exactly one Host header";
   const std::string_view host = request.header("host");
-  if (!isOurs(host, ":80", request)) {
+  // Whether the connection is encrypted is not known here; a port is no protection against a name.
+  if (!isOurs(host, ":80", request) && !isOurs(host, ":443", request)) {
     return "this server does not answer to the name " + quoted(host) +
            ": use its address, or allow the name with --http-allow if it is yours";
   }

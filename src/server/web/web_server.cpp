@@ -116,7 +116,7 @@ void WebServer::onRequest(const net::HttpRequest& request, const net::HttpReply&
   idleSeconds_ = 0;
   const std::string refusal = access_.refusal(request);
   if (!refusal.empty()) {
-    respond(reply, net::HttpResponse::of(403, refusal + '\n'));
+    respond(reply, net::HttpResponse::of(request.count("host") == 1 ? 403 : 400, refusal + '\n'));
   } else if (request.method != "GET" && request.method != "HEAD") {
     net::HttpResponse response = net::HttpResponse::of(405, "only GET and HEAD are allowed\n");
     response.headers = {{"Allow", "GET, HEAD"}};

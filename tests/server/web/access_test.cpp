@@ -36,6 +36,18 @@ TEST(WebAccess, RefusesForeignHostNames) {
   }
 }
 
+// Browsers leave out the port of the scheme.
+TEST(WebAccess, NeedsNoPortWhereTheSchemeSaysIt) {
+  const WebAccess encrypted({net::kLoopbackAddress, 443}, {"lab7"});
+  for (const char* host : {"localhost", "127.0.0.1", "lab7", "lab7:443"}) {
+    EXPECT_EQ(refusal({{"host", host}}, encrypted), "") << host;
+    EXPECT_EQ(refusal({{"host", host}, {"origin", std::string("https://") + host}}, encrypted), "") << host;
+  }
+  EXPECT_NE(refusal({{"host", "localhost:80"}}, encrypted), "");
+  EXPECT_NE(refusal({{"host", "evil.example"}}, encrypted), "");
+  EXPECT_NE(refusal({{"host", "localhost"}, {"origin", "http://localhost"}}, encrypted), "");
+}
+
 TEST(WebAccess, RequiresExactlyOneHostHeader) {
   EXPECT_NE(refusal({}), "");
   EXPECT_NE(refusal({{"host", "localhost:8080"}, {"host", "evil.example"}}), "");

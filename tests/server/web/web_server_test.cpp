@@ -336,6 +336,23 @@ TEST_F(Web, RefusesForeignNamesAndOriginsOnEveryPath) {
   EXPECT_EQ(get(web(), "/api/state").header("Access-Control-Allow-Origin"), "");
 }
 
+TEST_F(Web, ARequestWithoutANameOrWithTwoIsMalformed) {
+  const std::string host = "Host: " + web().text() + "\r\n";
+  for (const std::string& hosts : {std::string(), host + host}) {
+    EXPECT_EQ(ask(web(), "GET /healthz HTTP/1.1\r\nConnection: close\r\n" + hosts + "\r\n").status, 400);
+  }
+}
+
+TEST_F(Web, AWholeAddressIsJudgedByItsName) {
+  const std::string rest = "/healthz HTTP/1.1\r\nConnection: close\r\nHost: ";
+  EXPECT_EQ(ask(web(), "GET http://" + web().text() + rest + web().text() + "\r\n\r\n").status, 200);
+  EXPECT_EQ(ask(web(), "GET http://" + web().text() + rest + "proxy.example\r\n\r\n").status, 200);
+  for (const std::string& name : {std::string("evil.example"), web().text() + "@evil.example",
+                                  "evil.example@" + web().text(), std::string()}) {
+    EXPECT_EQ(ask(web(), "GET http://" + name + rest + web().text() + "\r\n\r\n").status, 403) << name;
+  }
+}
+
 TEST_F(Web, AllowsOnlyGetAndHead) {
   const std::string rest = " HTTP/1.1\r\nHost: " + web().text() + "\r\nConnection: close\r\n\r\n";
   for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS"}) {
@@ -343,7 +360,7 @@ TEST_F(Web, AllowsOnlyGetAndHead) {
     EXPECT_EQ(answer.status, 405) << method;
     EXPECT_EQ(answer.header("Allow"), "GET, HEAD");
   }
-  EXPECT_EQ(ask(web(), "GET http://" + web().text() + "/" + rest).status, 400);
+  EXPECT_EQ(ask(web(), "GET ftp://" + web().text() + "/" + rest).status, 400);
   const Answer head = ask(web(), "HEAD /api/state" + rest);
   EXPECT_EQ(head.status, 200);
   EXPECT_EQ(head.body, "");

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bundled } from "../bundled.mjs";
 
-const { Meshes } = await bundled("state.ts");
+const { Meshes, pollState } = await bundled("state.ts");
 
 /** A triangle as GET /api/mesh gives it. */
 function answer() {
@@ -41,4 +41,59 @@ test("a request that hangs ends with its connection, and the next one asks again
   asked[1].resolve(answer());
   await turn();
   assert.deepEqual(shown, [3]);
+});
+
+test("a mesh that deforms is asked for as soon as its last shape has come", async () => {
+  const asked = [];
+  globalThis.fetch = (url) => new Promise((resolve) => asked.push({ url, resolve }));
+  const meshes = new Meshes(() => undefined, () => undefined);
+  const state = (geometry) => meshes.update(0, [{ id: 3, triangles: 1, geometry }, { id: 4, triangles: 0, geometry: 0 }]);
+  await turn();
+  state(7);
+  assert.equal(meshes.deform, false, "a new one");
+  asked[0].resolve(answer());
+  await turn();
+  assert.equal(meshes.deform, false);
+  state(8);
+  assert.equal(meshes.deform, false, "its shape is on the way");
+  asked[1].resolve({ status: 404 });
+  await turn();
+  assert.equal(meshes.deform, true);
+  state(9);
+  assert.equal(asked.length, 3, "a shape that is no longer there is not waited for");
+  asked[2].resolve(answer());
+  await turn();
+  assert.equal(meshes.deform, true);
+  state(9);
+  assert.equal(meshes.deform, false, "it rests");
+  assert.equal(asked.length, 3);
+});
+
+test("states come four times a second, and four times as often while meshes deform", async () => {
+  const before = globalThis.window;
+  const timers = [];
+  globalThis.window = { setTimeout: (call, ms) => timers.push([call, ms]) };
+  let works = true;
+  let deforms = false;
+  let states = 0;
+  globalThis.fetch = async () => ({ ok: works, json: async () => ({}) });
+  /** Times between this state and the next one. */
+  const waits = async () => {
+    const all = [];
+    for (const last = states; states === last; await turn()) {
+      const [call, ms] = timers.shift();
+      all.push(ms);
+      call();
+    }
+    return all.reduce((sum, ms) => sum + ms, 0);
+  };
+  pollState(() => ++states, () => deforms);
+  await turn();
+  assert.equal(await waits(), 250);
+  deforms = true;
+  assert.equal(await waits(), 60);
+  works = false;
+  assert.equal(await waits(), 60);
+  assert.equal(await waits(), 2000, "of a server that does not answer no shape is known");
+  globalThis.window = before;
 });

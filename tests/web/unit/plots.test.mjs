@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { bundled } from "../bundled.mjs";
 
 const { Window } = await bundled("plots/window.ts");
-const { between, share } = await bundled("plots/counts.ts");
+const { between, gaps, share } = await bundled("plots/counts.ts");
 
 test("a window keeps the newest samples in order", () => {
   const window = new Window(2, 5);
@@ -53,4 +53,13 @@ test("the difference of two histograms, and its quantiles", () => {
   );
   assert.equal(share([[990, 4]], 0.5, now.bins), 1000);
   assert.equal(share([], 0.5), 0);
+});
+
+test("no line joins samples between which nobody measured", () => {
+  assert.deepEqual(gaps(Float64Array.of(), 0.5), []);
+  assert.deepEqual(gaps(Float64Array.of(1), 0.5), []);
+  assert.deepEqual(gaps(Float64Array.of(1, 1.5, 1.508, 4, 4.008, 9), 0.5), [
+    [1.508, 4],
+    [4.008, 9],
+  ]);
 });

@@ -10,7 +10,7 @@ const SETTLE_MS = 1000;
 export class ReplayBar {
   private readonly bar = byId("replay");
   private readonly pause = el("button", { type: "button" });
-  private readonly time = el("output");
+  private readonly time = el("output", { ariaLive: "off" });
   private readonly slider = el("input", { type: "range", min: "0", step: "0.01", ariaLabel: "Position in the recording, seconds" });
   private readonly marks = el("canvas", { height: 16 });
   private readonly speed = el("select", { ariaLabel: "Speed of the replay" });

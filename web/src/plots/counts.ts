@@ -41,3 +41,11 @@ export function usualEnd(columns: Float64Array[]): number {
   }
   return end;
 }
+
+/** Between which neighbours so much time passed that nobody measured in it: no line joins them. */
+export function gaps(times: ArrayLike<number>, longest: number): [from: number, to: number][] {
+  const found: [number, number][] = [];
+  for (let i = 1; i < times.length; ++i)
+    if (times[i]! - times[i - 1]! > longest) found.push([times[i - 1]!, times[i]!]);
+  return found;
+}

@@ -1,6 +1,6 @@
 // One live plot: uPlot over a sliding window of samples, in the colours of the page.
 import uPlot from "uplot";
-import { usualEnd } from "./counts";
+import { gaps, usualEnd } from "./counts";
 import { Window } from "./window";
 
 export interface Curve {
@@ -64,6 +64,7 @@ export class Plot {
     const caption = figure.appendChild(document.createElement("figcaption"));
     caption.append(options.title, " ");
     this.value = caption.appendChild(document.createElement("output"));
+    this.value.ariaLive = "off"; // it changes ten times a second
     if (options.curves.length > 1) caption.append(legend(options.curves));
     this.body = figure.appendChild(document.createElement("div"));
     parent.append(figure);
@@ -152,7 +153,7 @@ export class Plot {
     if (this.plot) return this.plot.setSize({ width, height });
     this.plot = new uPlot(
       this.uplotOptions(width, height),
-      this.window.data() as unknown as uPlot.AlignedData,
+      this.data() as unknown as uPlot.AlignedData,
       this.body,
     );
   }
@@ -187,6 +188,7 @@ export class Plot {
           stroke: css(c.colour),
           width: 1.5,
           points: { show: false },
+          gaps: (u) => gaps(u.data[0], seconds / 20).map((gap) => gap.map((t) => u.valToPos(t, "x", true)) as uPlot.Series.Gap),
         })),
       ],
     };
