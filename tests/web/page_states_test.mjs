@@ -295,6 +295,7 @@ test("what changes all the time is not read aloud", async () => {
   const server = await Server.start(hapticd);
   const viewer = await opened(server);
   await viewer.until("a plot", async () => (await viewer.text("[data-plot=Latency] output")).includes("ms"));
+  await viewer.page.locator("#hand-bar").waitFor();
   const session = await browser.context.newCDPSession(viewer.page);
   const { nodes } = await session.send("Accessibility.getFullAXTree");
   const live = nodes.filter((n) => n.properties?.some((p) => p.name === "live" && p.value.value !== "off"));
