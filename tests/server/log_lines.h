@@ -21,6 +21,7 @@ inline const std::shared_ptr<spdlog::sinks::dist_sink_mt> kLogSinks = [] {
   return sinks;
 }();
 
+/// The log goes here for as long as this lives.
 class LogLines {
  public:
   LogLines() { kLogSinks->set_sinks({sink_}); }

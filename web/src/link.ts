@@ -83,8 +83,8 @@ export class Link {
   private sent = 0;
   private sentAtPing = 0;
   private sentAtPong = 0;
-  /** The connection of a stop, until the server has read it. */
-  private beside: Endpoint | undefined;
+  /** The connections of stops, by device, until the server has read them. */
+  private readonly beside = new Map<string, Endpoint>();
 
   constructor(
     private readonly onState: (state: LinkState) => void,
@@ -139,18 +139,18 @@ export class Link {
   }
 
   private sendBeside(message: Outgoing): void {
-    if (this.beside) return; // its stop is on its way
     const { device } = this;
+    if (this.beside.has(device)) return; // its stop is on its way
     const socket = newSocket();
     const peer = new Endpoint(
       (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
       ({ name }) => name === PONG && end(),
     );
     const end = (): void => {
-      if (this.beside === peer) this.beside = undefined;
+      if (this.beside.get(device) === peer) this.beside.delete(device);
       socket.close();
     };
-    this.beside = peer;
+    this.beside.set(device, peer);
     socket.onopen = () => peer.open();
     socket.onmessage = (event: MessageEvent<ArrayBuffer>) => {
       const greeted = peer.connected;

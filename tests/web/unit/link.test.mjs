@@ -100,6 +100,11 @@ test("a stop behind an upload goes on a connection of its own, too", (t) => {
   assert.equal(link.sendAtOnce(stopForces()), true);
   assert.equal(link.sendAtOnce(stopForces()), true);
   assert.equal(Socket.all.length, 2, "one connection for a key that repeats");
+  link.use("Other");
+  assert.equal(link.sendAtOnce(stopForces()), true);
+  assert.equal(Socket.all.length, 3, "the stop of another device does not wait for the first one's");
+  Socket.all[2].end();
+  link.use("Arm");
   const [, beside] = Socket.all;
   beside.accept();
   assert.deepEqual(beside.received, ["Arm vrpn_ForceDevice startEffect", "Arm hapticd Stop_Forces", "Arm vrpn_Base ping_message"]);
@@ -107,14 +112,14 @@ test("a stop behind an upload goes on a connection of its own, too", (t) => {
   pong(beside);
   assert.equal(beside.readyState, 2, "it ends once the stop was read");
   link.sendAtOnce(stopForces());
-  assert.equal(Socket.all.length, 3);
+  assert.equal(Socket.all.length, 4);
   pong(socket); // of the ping before the upload
   t.mock.timers.tick(1000);
   pong(socket);
   t.mock.timers.tick(10_000);
-  assert.equal(Socket.all[2].readyState, 2, "nothing answers");
+  assert.equal(Socket.all[3].readyState, 2, "nothing answers");
   link.sendAtOnce(stopForces());
-  assert.equal(Socket.all.length, 3, "the server has read the upload");
+  assert.equal(Socket.all.length, 4, "the server has read the upload");
 });
 
 test("bytes that are no VRPN end the connection at once, and a new one is made", async () => {
