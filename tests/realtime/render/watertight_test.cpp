@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "realtime/render/contact_query.h"
+#include "reduced.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -30,7 +31,7 @@ TEST_P(WatertightTest, thin_plate_stops_a_fast_hand) {
     scene.faces = faces;
     if (faces == scene::TouchableFaces::front) add(plate, surface());
     for (const double speed : {0.1, 1.0, 5.0}) {
-      for (int i = 0; i < 300; ++i) {
+      for (int i = 0; i < reduced(300); ++i) {
         const auto& t = top.triangles[random() % top.triangles.size()];
         const auto corner = [&](int k) {
           return Vec3(top.vertices[t[static_cast<std::size_t>(k)]].cast<double>());
