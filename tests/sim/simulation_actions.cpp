@@ -163,7 +163,7 @@ void Simulation::upload(Dice& dice) {
   for (std::size_t i = 0; i < messages; ++i) {
     wire::MeshVertices vertices;
     vertices.object = kUploaded;
-    vertices.first = static_cast<std::int32_t>(i % 20 * kVertices);
+    vertices.first = static_cast<std::int32_t>(i % 4 * kVertices);
     vertices.positions.values.assign(3 * kVertices, 1000.0F + static_cast<float>(i));
     uploader_->queue(vertices);
   }
