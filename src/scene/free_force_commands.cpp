@@ -148,19 +148,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
     start(entry, waiting->second.owner, call.now);
     waitingStarts_.erase(waiting);
   }
-  if (entry.value.running) tellOfSum(call);
-}
-
-// Warns the client whose effect is lowered beside what else acts.
-void FreeForces::tellOfSum(const Call& call) const {
-  if (bound_.loadOf(sumOfEffects()) == 0) return;
-  const long percent = std::lround(100 * shareTogether(load_Ns_per_m(worldUnitsPerMetre_)));
-  if (percent < 100)
-    call.warn(
-        "startEffect",
-        "all effects together, with the fields and surfaces, would be unstable on this device: their gains "
-        "are lowered",
-        " to ", percent, " %");
+  if (entry.value.running) tellOfSum_.insert(call.client);
 }
 
 // The definition may travel by UDP and arrive after the start.
@@ -168,7 +156,7 @@ void FreeForces::start(std::int32_t index, Nanos at, const Call& call) {
   const auto known = effects_.find(index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
     start(known->second, call.client, at);
-    tellOfSum(call);
+    tellOfSum_.insert(call.client);
     return;
   }
   if (waitingStarts_.size() < config_.limits.effects || waitingStarts_.count(index) != 0) {
@@ -259,10 +247,6 @@ void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
                 " plane 0, ", value);
     return;
   }
-  const double most_m = kHighestDetail_m * worldUnitsPerMetre_ / kWorldUnitsPerStockMetre;
-  if (std::max(c.textureAmplitude_m, c.buzzAmplitude_m) > most_m)
-    call.warn(kName, "a texture or buzz is higher than 10 mm of the device and is lowered to that",
-              " plane 0, ", std::max(c.textureAmplitude_m, c.buzzAmplitude_m), " m to ", most_m);
   asked_.keep(c, call.client);
   Plane detail;
   detail.adhesionNormal_N = c.adhesionNormal_N;
@@ -276,6 +260,7 @@ void FreeForces::handle(SetPlaneDetail& c, const Call& call) {
   detail.buzzAngularFrequency_rad_per_s =
       kTau * renderable(c.buzzFrequency_Hz, 1, config_, call, kName, " plane 0, buzz ");
   planeDetail_ = {call.client, detail, kNever};
+  tellOfDetail_ = true;
   changed_ = true;
 }
 

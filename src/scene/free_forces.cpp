@@ -172,6 +172,38 @@ void FreeForces::keepPassiveTogether(PublishedForces& forces, double worldUnitsP
   }
 }
 
+// Warns the clients whose effects started or changed and are lowered beside what else acts.
+void FreeForces::tellOfEffects(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
+  const long percent = std::lround(100 * share_);
+  for (const ClientId client : std::exchange(tellOfSum_, {})) {
+    const bool isLowered =
+        percent < 100 && std::any_of(effects_.begin(), effects_.end(), [client](const auto& e) {
+          const RunningEffect& effect = e.second.value;
+          return e.second.owner == client && effect.running && !effect.effect.releasing &&
+                 effect.effect.gain > 0;
+        });
+    if (!isLowered) continue;
+    const Call call{client, now, false, board, out};
+    call.warn(
+        "startEffect",
+        "all effects together, with the fields and surfaces, would be unstable on this device: their gains "
+        "are lowered",
+        " to ", percent, " %");
+  }
+}
+
+void FreeForces::tellOfDetail(double worldUnitsPerMetre, Nanos now, NoticeBoard& board,
+                              std::vector<Notice>& out) {
+  if (!std::exchange(tellOfDetail_, false) || !planeDetail_ || planeDetail_->value.releasing) return;
+  const Plane& detail = planeDetail_->value;
+  const double highest = std::max(detail.textureAmplitude, detail.buzzAmplitude);
+  const double most = kHighestDetail_m * worldUnitsPerMetre;
+  if (highest <= most) return;
+  const Call call{planeDetail_->owner, now, false, board, out};
+  call.warn("sendSurface", "a texture or buzz is higher than 10 mm of the device and is lowered to that",
+            " plane 0, ", highest / kWorldUnitsPerStockMetre, " m to ", most / kWorldUnitsPerStockMetre);
+}
+
 // Once for each field and share: its owner learns why it feels less than it asked for.
 void FreeForces::tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now,
                               NoticeBoard& board, std::vector<Notice>& out) {
@@ -240,8 +272,10 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double
   }
   forces.fields = passiveFields(worldUnitsPerMetre);
   keepPassiveTogether(forces, worldUnitsPerMetre);
+  tellOfEffects(now, board, out);
   tellOfFields(forces, worldUnitsPerMetre, now, board, out);
   tellOfPlanes(forces, now, board, out);
+  tellOfDetail(worldUnitsPerMetre, now, board, out);
   if (buzz_) forces.buzz = buzz_->value;
   return forces;
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "scene/commands.h"
@@ -145,7 +146,8 @@ class FreeForces {
   std::vector<ForceField> passiveFields(double worldUnitsPerMetre) const;
   double loadWith(const std::vector<ForceField>& fields, double worldUnitsPerMetre) const;
   SpringSum sumOfEffects() const;
-  void tellOfSum(const Call& call) const;
+  void tellOfEffects(Nanos now, NoticeBoard& board, std::vector<Notice>& out);
+  void tellOfDetail(double worldUnitsPerMetre, Nanos now, NoticeBoard& board, std::vector<Notice>& out);
   double shareTogether(double load_Ns_per_m) const;
   void keepPassiveTogether(PublishedForces& forces, double worldUnitsPerMetre);
   void tellOfFields(const PublishedForces& forces, double worldUnitsPerMetre, Nanos now, NoticeBoard& board,
@@ -174,6 +176,9 @@ class FreeForces {
   double heaviestSurface_Ns_per_m_ = 0;  // of objects, when last published
   double worldUnitsPerMetre_ = 1000;     // then
   double share_ = 1;                     // then, of what does not ramp out
+  // What to tell at the next publication, when all that comes together is known.
+  std::set<ClientId> tellOfSum_;  // whose effects started or changed
+  bool tellOfDetail_ = false;
   FieldShare fieldTold_;
   FieldShare constraintTold_;
   std::array<PlaneShare, kMaxPlanes> planesTold_;  // by index

@@ -221,6 +221,41 @@ void endTheSame(LateRecording& r, const RecordingFile& file, std::uint64_t ticks
   EXPECT_EQ(compared.same, compared.ticks) << compared.firstDifference;
 }
 
+// A plane that came above the hand, and later anew, has two times: its buzz counts from the first one.
+TEST(RecordingBegunLate, BuzzesAPlaneInTimeThatWasPlacedAnewAboveTheHand) {
+  const RecordingFile file;
+  LateRecording r;
+  const scene::SetPlaneDetail buzz{0, 0, 0, 0, 0.0005, 33.3};
+  r.glide(kAbove, 700);
+  r.send(scene::SetPlane{0, {0, 1, 0, -0.0295}, 0.3, 0, 0, 0, 10});
+  r.glide(kAbove, 107);
+  r.send(scene::SetPlane{0, {0, 1, 0, -0.0305}, 0.3, 0, 0, 0, 10});
+  r.glide(kAbove, 50);
+  r.glide({1, 32, 2}, 300);
+  r.record(file.path());
+  r.glide({1, 32, 2}, 50);
+  r.send(buzz);
+  r.glide({1, 29, 2}, 300);
+  endTheSame(r, file, 300);
+}
+
+// The buzz that is there when the recording begins does not keep it from knowing what the servo knows.
+TEST(RecordingBegunLate, KnowsABuzzingPlaneThatWasPlacedAnewAboveTheHand) {
+  const RecordingFile file;
+  LateRecording r;
+  r.glide(kAbove, 700);
+  r.send(scene::SetPlane{0, {0, 1, 0, -0.0295}, 0.3, 0, 0, 0, 10});
+  r.send(scene::SetPlaneDetail{0, 0, 0, 0, 0.0005, 33.3});
+  r.glide(kAbove, 107);
+  r.send(scene::SetPlane{0, {0, 1, 0, -0.0305}, 0.3, 0, 0, 0, 10});
+  r.glide(kAbove, 50);
+  r.glide({1, 32, 2}, 300);
+  r.record(file.path());
+  r.glide({1, 32, 2}, 50);
+  r.glide({1, 29, 2}, 300);
+  endTheSame(r, file, 300);
+}
+
 // The force ramps in until the effect has ended: so no tick that is compared felt it.
 TEST(RecordingBegunLate, EndsATimedEffectWhenItEnded) {
   const RecordingFile file;

@@ -237,8 +237,8 @@ TEST_F(Forces, EffectsTogetherStayWithinTheBound) {
   EXPECT_DOUBLE_EQ(scene_->effects[0].gain, 9000);
   say(DefineEffect{.type = "viscous", .index = 2, .gain = 0.004, .magnitude_N = 1});
   say(StartEffect{2});
-  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("all effects together"));
   ASSERT_TRUE(publish());
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("all effects together"));
   EXPECT_NEAR(load(), 4.995, 1e-9);
   EXPECT_NEAR(scene_->effects[0].gain / scene_->effects[1].gain, 9000 / 4.0, 1e-6)
       << "as they were asked for";
@@ -351,6 +351,34 @@ TEST_F(Forces, ClientsLearnThatWhatTheySetIsLoweredBesidePlanesAndFields) {
   ASSERT_TRUE(publish());
   EXPECT_THAT(texts(7), HasSubstr("startEffect to 91 %"));
   EXPECT_THAT(texts(kOther), HasSubstr("sendForceField"));
+}
+
+// A client that sets all at once learns it, too, in whatever order.
+TEST_F(Forces, ClientsLearnThatTheirEffectsAreLoweredBesideWhatComesWithThem) {
+  const auto percentOf = [this](const std::vector<SceneCommand>& commands) {
+    for (const SceneCommand& command : commands) say(command);
+    run(100 * kMillisecond);
+    std::string percent;
+    for (const Notice& notice : notices_) {
+      if (notice.text.rfind("startEffect to ", 0) == 0) percent += notice.text.substr(15, 5);
+    }
+    say(ResetScene{});
+    run(1'000 * kMillisecond);
+    notices_.clear();
+    return percent;
+  };
+  const DefineEffect spring{.type = "spring", .index = 1, .gain = 9, .magnitude_N = 1};
+  const SetPlane plane{.plane = {0, 0, 1, 0}, .stiffness = 1, .damping = 0.004F};
+  EXPECT_EQ(percentOf({spring, StartEffect{1}}), "");
+  EXPECT_EQ(percentOf({spring, StartEffect{1}, plane}), "55 %:");
+  EXPECT_EQ(percentOf({plane, spring, StartEffect{1}}), "55 %:");
+  EXPECT_EQ(percentOf({plane, spring, StartEffect{1}, StopEffect{1}}), "");
+  const std::vector<SceneCommand> mesh{SetVertices{0, 0, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
+                                       SetSurface{0, 1.0F, 0.004F}};
+  EXPECT_EQ(percentOf({mesh[0], mesh[1], spring, StartEffect{1}}), "55 %:");
+  EXPECT_EQ(percentOf({SetHapticScale{10}, SetConstraintMode{1}, SetConstraintStiffness{900},
+                       SetConstraintEnabled{true}, spring, StartEffect{1}}),
+            "56 %:");
 }
 
 // Its slope there is a stiffness as any other.
@@ -669,15 +697,22 @@ TEST_F(Forces, TextureAndBuzzEndWithTheirClient) {
 
 TEST_F(Forces, WhoSendsATextureOfMoreThan10mmOfTheDeviceIsTold) {
   say(SetPlaneDetail{.textureAmplitude_m = 0.010, .textureWavelength_m = 0.1, .buzzAmplitude_m = 0.010});
+  publish();
   EXPECT_TRUE(notices_.empty());
   say(SetPlaneDetail{.textureAmplitude_m = 0.5, .textureWavelength_m = 2});
-  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.5 m to 0.01"));
-  say(SetHapticScale{10});
   publish();
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.5 m to 0.01"));
+  say(SetHapticScale{10});  // together with what follows
   say(SetPlaneDetail{.textureAmplitude_m = 0.09, .textureWavelength_m = 1});
+  publish();
   EXPECT_TRUE(notices_.empty()) << "9 mm of the device";
   say(SetPlaneDetail{.buzzAmplitude_m = 0.2, .buzzFrequency_Hz = 10});
+  publish();
   EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.2 m to 0.1"));
+  say(SetHapticScale{0.1});
+  say(SetPlaneDetail{.buzzAmplitude_m = 0.005, .buzzFrequency_Hz = 10});
+  publish();
+  EXPECT_THAT(onlyNotice(Severity::warning), HasSubstr("plane 0, 0.005 m to 0.001"));
 }
 
 TEST_F(Forces, FieldIsInWorldUnitsAndAllZeroStopsIt) {

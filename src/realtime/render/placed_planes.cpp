@@ -154,6 +154,7 @@ bool PlacedPlanes::placeOne(Nanos now, const Vec3& hip, double toolRadius_m, Pla
   if (anew_) memory.touched = memory.adheres = false;
   // As with objects, the hand is not lifted out of what came around it.
   const double missing_m = missingOf(plane, memory.depth_m, now - memory.placed);
+  memory.rises = missing_m > 0;
   const double rise_m = depth_m + memory.wave_m - missing_m - std::max(0.0, memory.level_m + sunk_m);
   const bool cameDeep = fresh ? memory.depth_m > kLongestMotion_m : viewMoved_ && rise_m > kLongestMotion_m;
   memory.leftOut = (anew_ || cameDeep || memory.leftOut) && depth_m > 0;
@@ -205,11 +206,10 @@ bool PlacedPlanes::remember(RenderMemory& out) const noexcept {
   for (std::size_t i = 0; i < out.planeCount; ++i) {
     const Memory& m = memory_[i];
     if (m.touched || m.adheres || m.leftOut || m.releaseBegin >= 0) return false;
-    // One time for both: where the placement brought nothing below it, the hand does not feel since when.
-    const bool rises = m.depth_m > 0;
-    const bool buzzes = m.detail[4] > 0;
-    if (rises && buzzes && m.placed != m.buzzing) return false;
-    out.planes[i] = {m.index, rises ? m.placed : m.buzzing, m.depth_m, m.raised_m};
+    // One time for both: of a plane that has risen, the hand does not feel since when. One that does not buzz
+    // yet may do so later.
+    if (m.rises && m.placed != m.buzzing) return false;
+    out.planes[i] = {m.index, m.rises ? m.placed : m.buzzing, m.rises ? m.depth_m : 0, m.raised_m};
   }
   return true;
 }

@@ -76,6 +76,7 @@ class PlacedPlanes {
     Nanos buzzing = 0;  ///< since when, however often it was placed since
     Nanos releaseBegin = -1;
     double depth_m = 0;  ///< by which the placement brought the HIP below it
+    bool rises = false;  ///< it has not risen by all of that yet
     double under_m = 0;  ///< of the HIP below the surface, in the last tick
     /// The same as if it did not sink, and negative above it; -infinity: it was not there.
     double level_m = -std::numeric_limits<double>::infinity();
