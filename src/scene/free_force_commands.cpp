@@ -229,6 +229,11 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
   const bool stays = known != planes_.end() && !known->second.value.releasing &&
                      known->second.value.normal == plane.normal && known->second.value.offset == plane.offset;
   plane.placement = stays ? known->second.value.placement : ++placements_;
+  // It goes on rising as it began: with another time it would fall, or jump.
+  if (stays) {
+    plane.recovery = known->second.value.recovery;
+    c.recoveryCycles = static_cast<std::int32_t>(plane.recovery / Nanos{1'000'000});
+  }
   plane.owner = ownerOf(call.client);
   planes_[c.index] = {call.client, plane, kNever};
   asked_.keep(c, call.client, c.index);

@@ -651,6 +651,7 @@ TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
   say(SetPlane{.index = 0, .plane = {0, 2, 0, 0.02}, .stiffness = 0.5});
   publish();
   EXPECT_EQ(scene_->planes[0].placement, p.placement) << "another surface, the same place";
+  EXPECT_EQ(scene_->planes[0].recovery, p.recovery) << "it rises as it began to";
   say(SetPlane{.index = 0, .plane = {0, 2, 0, 0.03}, .stiffness = 0.5});
   publish();
   EXPECT_NE(scene_->planes[0].placement, p.placement);

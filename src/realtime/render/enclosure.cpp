@@ -63,6 +63,8 @@ class Test {
   bool isSpent() const noexcept { return budget_.visits <= 0; }
 
   bool enclosedAlong(int ray) noexcept {
+    budget_.visits -= EnclosureBudget::kRayVisits;
+    if (isSpent()) return true;
     const Vec3 d = reach_ * rayAlong(ray);
     int sum = 0;
     mesh_.indexAt(now_).visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {
@@ -78,6 +80,7 @@ class Test {
 
   bool isWithin(double radius_m) noexcept {
     if (radius_m == 0) return false;
+    if (isSpent()) return true;
     bool within = false;
     const Vec3 at = object_.T_device_object * p_;
     mesh_.indexAt(now_).visitNear(p_, radius_m * object_.stretch,

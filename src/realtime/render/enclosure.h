@@ -6,10 +6,11 @@
 
 namespace hapticd::realtime {
 
-/// Visits to triangles that the tests of one tick may make. An object whose test exceeds it counts as
-/// enclosing, which exerts no force.
+/// Visits to triangles that the tests of one tick may make; a ray counts as kRayVisits more. An object whose
+/// test exceeds it counts as enclosing, which exerts no force.
 struct EnclosureBudget {
-  int visits = 16384;
+  static constexpr int kRayVisits = 8;  ///< the way of a ray through a tree takes as long
+  int visits = 8192;
 };
 
 /// True when the tool at p (device metres) is inside a closed surface of the object, or its ball intersects
