@@ -10,6 +10,7 @@ trap 'rm -rf "$work"' EXIT
 grep -q '^tick  ' "$work/list"
 "$hapticd" bench --help | grep -q -- '--full'
 "$hapticd" --help | grep -q '^ *bench '
+diff -B <("$hapticd" bench --help) <("$(dirname "$hapticd")/hapticd-bench" --help)  # both declare the same options
 
 status=0
 "$hapticd" bench nosuchthing 2>"$work/error" || status=$?
