@@ -120,7 +120,7 @@ Finding portFree(const std::string& protocol, std::uint16_t port,
   }
 }
 
-Finding isolation(double seconds) {
+Finding isolation(double seconds, bool realtimeGranted) {
   constexpr double kCheap_us = 20;
   try {
     const IsolationCheck check = measureIsolation(seconds);
@@ -132,7 +132,8 @@ Finding isolation(double seconds) {
         check.postToTick_us.p50, check.postToTick_us.p99, check.postToTick_us.max, check.rounds);
     if (check.postToTick_us.p99 < kCheap_us) return {Verdict::good, text, ""};
     return {Verdict::note, text,
-            "more than 20 us at the 99th percentile: realtime rights and a quiet machine help"};
+            std::string("more than 20 us at the 99th percentile: ") +
+                (realtimeGranted ? "a quiet machine helps" : "realtime rights and a quiet machine help")};
   } catch (const std::exception& error) {
     return {Verdict::note, std::string("the measurement failed: ") + error.what(), ""};
   }
@@ -161,7 +162,9 @@ int run(double seconds, std::uint16_t port, bool json) {
     std::fflush(stdout);
   };
   title("realtime\n");
-  add(realtimePriority());
+  const Finding priority = realtimePriority();
+  const bool realtimeGranted = priority.verdict == Verdict::good;
+  add(priority);
   add(memoryLock());
   add(governor());
   add(timerResolution());
@@ -188,11 +191,12 @@ int run(double seconds, std::uint16_t port, bool json) {
       loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
   add({steady ? Verdict::good : Verdict::bad, text,
-       steady ? ""
-              : "close other programs, get realtime rights for the loop, or use a kernel with PREEMPT_RT"});
+       steady            ? ""
+       : realtimeGranted ? "close other programs, or use a kernel with PREEMPT_RT"
+                         : "get realtime rights for the loop; then close other programs"});
 
   title("a driver in its own process (--isolate), %g s\n", seconds);
-  add(isolation(seconds));
+  add(isolation(seconds, realtimeGranted));
 
   int bad = 0;
   int notes = 0;

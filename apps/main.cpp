@@ -70,6 +70,14 @@ bool explainUnknownCommand(const CLI::App& app) {
   return true;
 }
 
+// False when a command was typed.
+bool explainMissingCommand(const CLI::App& app, const CLI::ParseError& error) {
+  const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
+  if (code != CLI::ExitCodes::RequiredError || !app.get_subcommands().empty()) return false;
+  std::fprintf(stderr, "hapticd: a command is required; 'hapticd --help' lists the commands\n");
+  return true;
+}
+
 // CLI11's own texts name neither the command nor, for some errors, what to do.
 std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
@@ -89,7 +97,7 @@ std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
 int explain(const CLI::App& app, const CLI::ParseError& error) {
   if (explainUnknownCommand(app)) return 2;
   if (error.get_exit_code() == 0) return app.exit(error);
-  if (explainUnknownOption(app)) return 2;
+  if (explainUnknownOption(app) || explainMissingCommand(app, error)) return 2;
   const std::string name = typedCommand(app).second;
   std::fprintf(stderr, "%s: %s; '%s --help' lists the options\n", name.c_str(), textOf(app, error).c_str(),
                name.c_str());

@@ -275,7 +275,8 @@ int run(const PlotOptions& options) {
   if (!pdf && !options.out.ends_with(".svg"))
     throw std::runtime_error("'" + options.out + "' must end with .svg or .pdf");
   if (options.to_s > 0 && options.to_s <= options.from_s)
-    throw std::runtime_error("--to must be greater than --from");
+    throw std::runtime_error("--to must be greater than --from, " + label(options.from_s) +
+                             ", or 0 for the end; got " + label(options.to_s));
   keepFile(options.out, options.force);
   record::ExportFile file(options.out, record::Unfinished::dropped);
   const Data data = read(options);

@@ -81,8 +81,8 @@ void addSurfaceOptions(CLI::App& command, MeshRenderOptions& options) {
   add("--damping-Ns-per-m,--damping", options.damping_Ns_per_m, "Damping B along the normal", 1e6);
   add("--static-friction", options.staticFriction, "Coulomb coefficient while sticking", 1e6);
   add("--dynamic-friction", options.dynamicFriction,
-      "Coulomb coefficient while sliding, at most the static, which it raises when it changes a recording "
-      "alone",
+      "Coulomb coefficient while sliding, at most the static one; given alone with --session, it raises a "
+      "lower static one, too",
       1e6);
   add("--tool-radius-mm,--tool-radius", options.toolRadius_mm, "Radius of the tip; 0 is a point", 50);
   command.add_flag("--raw", options.raw,

@@ -133,7 +133,7 @@ void declare(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
   using namespace hapticd::bench;
-  CLI::App app{"Measures how fast hapticd is, against yardsticks on this machine."};
+  CLI::App app{"Measure how fast hapticd is, against yardsticks on this machine"};
   Options options;
   declare(app, options);
   try {

@@ -40,7 +40,6 @@ void uploadBox(hapticd::Client& client) {
                                                         {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
                                                         {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   client.batch([&] {
-    client.resetScene();
     client.setSurface(0, {.stiffness = 0.6F, .staticFriction = 0.3F, .dynamicFriction = 0.2F});
     client.uploadMesh(0, {corners, faces});
   });
@@ -54,6 +53,13 @@ int main(int argc, char** argv) try {
   const auto can = client.waitCapabilities();
   const double tick_s = can ? 1 / can->servoRate_Hz : 0.001;
   const bool lead = can && can->holdHand;
+  const auto lead_to = [&](double x_mm) {
+    if (lead) client.holdHand({{x_mm, 0, 0}});
+  };
+  client.resetScene();  // what other clients left would hold the hand
+  lead_to(-50);
+  client.runFor(500ms);  // otherwise the box could appear around the hand
+  uploadBox(client);
 
   Box box;
   double strongest_N = 0;
@@ -70,13 +76,6 @@ int main(int argc, char** argv) try {
     ticks += r.contacts.empty() ? 0 : 1;
   });
   client.subscribe(hapticd::Reports::contacts, can ? can->servoRate_Hz : 0);
-
-  const auto lead_to = [&](double x_mm) {
-    if (lead) client.holdHand({{x_mm, 0, 0}});
-  };
-  lead_to(-50);
-  client.runFor(500ms);  // otherwise the box could appear around the hand
-  uploadBox(client);
 
   constexpr auto kFrame = 4ms;
   const auto start = std::chrono::steady_clock::now();

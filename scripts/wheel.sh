@@ -4,7 +4,7 @@
 # Needs the section python of packages.txt. The time stamps in the wheels are $SOURCE_DATE_EPOCH, or that of the last commit.
 set -euo pipefail
 source_dir=$(cd "$(dirname "$0")/.." && pwd)
-[ $# -ge 1 ] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
+[[ $# -ge 1 && $1 != -* ]] || { sed -n '2,4s/^# *//p' "$0"; exit 2; }
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
 python=${2:-/usr/bin/python3}

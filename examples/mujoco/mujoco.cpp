@@ -25,6 +25,8 @@ int main(int argc, char** argv) try {
   const double seconds = argc > 3 ? std::atof(argv[3]) : scene.path().back().time_s;
   const auto can = client.waitCapabilities();
   if (!can || !can->remoteContacts) throw std::runtime_error("the server takes no remote contacts");
+  client.onText([](const hapticd::TextReport& r) { std::fprintf(stderr, "server: %s\n", r.text.c_str()); });
+  client.resetScene();  // MuJoCo does not know what other clients left
   client.subscribe(hapticd::Reports::hand, can->servoRate_Hz);
 
   constexpr auto kFrame = 4ms;

@@ -230,7 +230,14 @@ void Link::runOnce() {
 }
 
 std::string Link::whyNotConnected() const {
-  if (lastFailure_.find(std::strerror(ECONNREFUSED)) != std::string::npos) {
+  const auto failedBy = [&](int error) {
+    return lastFailure_.find(std::strerror(error)) != std::string::npos;
+  };
+  if (!server_.socket.empty() && (failedBy(ENOENT) || failedBy(ECONNREFUSED))) {
+    return "nothing listens on " + server_.text() + " (" + lastFailure_ +
+           "): start `hapticd serve` with this socket, or correct the path";
+  }
+  if (failedBy(ECONNREFUSED)) {
     return "nothing listens on " + server_.text() + " (" + lastFailure_ +
            "): start `hapticd serve` there, or correct host and port";
   }

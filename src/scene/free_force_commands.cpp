@@ -223,7 +223,7 @@ void FreeForces::handle(SetPlane& c, const Call& call) {
   keepPassive(plane.surface, bound_, remark);
   if (!remark.empty()) {
     call.post(Notice::Severity::warning, "plane",
-              "sendSurface plane " + std::to_string(c.index) + ": " + remark.substr(0, remark.size() - 2));
+              "sendSurface plane " + std::to_string(c.index) + ": " + remark);
   }
   const auto known = planes_.find(c.index);
   const bool stays = known != planes_.end() && !known->second.value.releasing &&

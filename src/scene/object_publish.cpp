@@ -248,7 +248,7 @@ void ObjectTable::updateSurface(Object& object, Nanos now, NoticeBoard& board, s
   if (!remark.empty() && remark != object.surfaceRemark) {
     const Call call{object.surfaceSetBy, now, false, board, out};
     call.post(Notice::Severity::warning, "surface",
-              "surface of object " + std::to_string(object.id) + ": " + remark.substr(0, remark.size() - 2));
+              "surface of object " + std::to_string(object.id) + ": " + remark);
   }
   if (const long percent = std::lround(100 * share); percent < 100) {
     const Call call{object.surfaceSetBy, now, false, board, out};

@@ -28,6 +28,10 @@ double clampStock(double value, double max, bool raw, std::string_view what, con
   return clamped;
 }
 
+void append(std::string& remark, const std::string& part) {
+  remark += (remark.empty() ? "" : "; ") + part;
+}
+
 }  // namespace
 
 Surface SurfaceSettings::atOne(const SceneConfig& config) {
@@ -108,8 +112,8 @@ Surface SurfaceSettings::resolve(const PassivityBound& bound, std::string& remar
   Surface surface = asked_;
   if (surface.dynamicFriction > surface.staticFriction) {
     if (staticGiven_) {
-      remark += "dynamic friction " + textOf(surface.dynamicFriction) + " is above static friction " +
-                textOf(surface.staticFriction) + " and is lowered to it; ";
+      append(remark, "dynamic friction " + textOf(surface.dynamicFriction) + " is above static friction " +
+                         textOf(surface.staticFriction) + " and is lowered to it");
     }
     surface.dynamicFriction = surface.staticFriction;
   }
@@ -138,17 +142,15 @@ std::optional<Surface> surfaceFromStock(double stiffness, double damping, double
 
 void keepPassive(Surface& surface, const PassivityBound& bound, std::string& remark) {
   if (const double max = bound.maxStiffness_N_per_m(); surface.stiffness_N_per_m > max) {
-    remark += "stiffness " + textOf(surface.stiffness_N_per_m) +
-              " N/m would be unstable on this device and is "
-              "lowered to " +
-              textOf(max) + "; ";
+    append(remark, "stiffness " + textOf(surface.stiffness_N_per_m) +
+                       " N/m would be unstable on this device and is lowered to " + textOf(max));
     surface.stiffness_N_per_m = max;
   }
   const double max = std::max(0.0, bound.maxDamping_Ns_per_m(surface.stiffness_N_per_m));
   if (surface.damping_Ns_per_m > max) {
-    remark += "damping " + textOf(surface.damping_Ns_per_m) + " N s/m beside stiffness " +
-              textOf(surface.stiffness_N_per_m) + " N/m would be unstable on this device and is lowered to " +
-              textOf(max) + "; ";
+    append(remark, "damping " + textOf(surface.damping_Ns_per_m) + " N s/m beside stiffness " +
+                       textOf(surface.stiffness_N_per_m) +
+                       " N/m would be unstable on this device and is lowered to " + textOf(max));
     surface.damping_Ns_per_m = max;
   }
 }

@@ -184,7 +184,9 @@ bool Recordings::beginScene(SceneHost& scene) {
 void Recordings::start(const std::string& name, Nanos wallOffset, std::string config, Begun begun,
                        Listener listener) {
   if (beginning_) throw RecordingError("refused: another recording begins");
-  if (!file().empty()) throw RecordingError("refused: this server records to " + file() + " already");
+  if (!file().empty())
+    throw RecordingError("refused: this server records to " + file() +
+                         " already; end that recording first ('hapticd record NAME@HOST --server --end')");
   if (!name.empty()) checkName(name);
   endPresent({});  // one that could not be written further
   if (ended_.size() >= kMostEnded)

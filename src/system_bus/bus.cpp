@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <string>
 
 namespace hapticd::system_bus {
 namespace {
@@ -23,7 +24,10 @@ void check(const char* what, int result) {
 
 Bus::Bus(int wakeFd) {
   sd_bus* bus = nullptr;
-  check("no system bus (D-Bus)", sd_bus_open_system(&bus));
+  const int opened = sd_bus_open_system(&bus);
+  if (opened < 0)
+    throw Unavailable(std::string("no system bus (D-Bus): ") + std::strerror(-opened) +
+                      "; install it by 'apt install dbus'; a container needs /run/dbus of its machine");
   bus_.reset(bus);
   check("the system bus", sd_bus_set_method_call_timeout(bus, std::uint64_t{kPatience_ms} * 1000));
   constexpr int kStep_ms = 20;

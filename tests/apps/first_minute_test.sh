@@ -65,7 +65,7 @@ grep -qFx '[OPTIONS] [server]' "$work/share/man/man1/hapticd-stop.1"
 # Lines of an option stay lines, a page has no empty part, and the documents are where the package has them.
 grep -qFx .br "$work/share/man/man1/hapticd-serve.1"
 ! grep -A1 -x '.SH OPTIONS' "$work/share/man/man1/hapticd-bench.1" | grep -qx '.SH SEE ALSO' || exit 1
-grep -q 'hapticd bench .*help' "$work/share/man/man1/hapticd-bench.1"
+grep -qF -- '\-\-full' "$work/share/man/man1/hapticd-bench.1"
 for page in "$work"/share/man/man1/*.1; do tail -1 "$page" | grep -qx /usr/share/doc/hapticd-doc; done
 grep -qF "NAME@host[:port], NAME@tcp://host[:port] or NAME@unix:PATH" "$work/share/fish/vendor_completions.d/hapticd.fish"
 grep -qF "Simulated device\: '\\''script'\\'' strokes the objects of the scene \[script\]" "$work/share/zsh/vendor-completions/_hapticd"
@@ -76,4 +76,5 @@ mkdir "$work/files"
 touch "$work/files/my mesh.obj"
 completes touch m | grep -qx 'my mesh.obj'
 [ "$(completes serve --po)" = --port ]
+[ "$(completes bench --fu)" = --full ]
 [ "$(completes help wat)" = watch ]

@@ -23,7 +23,7 @@ refused 2 "unknown command 'xyzzyx'; 'hapticd --help'" "$hapticd" help xyzzyx
 refused 2 "hapticd touch: unknown option '--nothing-alike'" "$hapticd" touch --nothing-alike
 refused 2 "hapticd touch: mesh is required; 'hapticd touch --help'" "$hapticd" touch
 refused 2 "hapticd: unknown command ''; 'hapticd --help'" "$hapticd" ''
-refused 2 "hapticd: A subcommand is required; 'hapticd --help'" "$hapticd"
+refused 2 "hapticd: a command is required; 'hapticd --help' lists the commands" "$hapticd"
 refused 2 "hapticd serve: unexpected argument 'first'; 'hapticd serve --help'" "$hapticd" serve first second
 refused 2 "hapticd serve: unexpected argument 'my.cfg'; use '--config my.cfg'; 'hapticd serve --help'" "$hapticd" serve my.cfg
 refused 2 "hapticd watch: unexpected argument 'third'; 'hapticd watch --help'" "$hapticd" watch Phantom@localhost third fourth
@@ -37,7 +37,9 @@ for number in 0x10 0X1p3 nan inf -1 1e10; do
   refused 2 "must be a number from 0 to 1e+09, got '$number'" "$hapticd" serve "--seconds=$number"
 done
 refused 2 "hapticd bench: there is no benchmark 'xyzzyx'; hapticd bench --list" "$hapticd" bench xyzzyx
-refused 2 "hapticd bench: The following argument was not expected: --nothing-alike; 'hapticd bench --help'" "$hapticd" bench --nothing-alike
+refused 2 "hapticd bench: unknown option '--nothing-alike'; 'hapticd bench --help'" "$hapticd" bench --nothing-alike
+refused 2 "hapticd bench: unknown option '--ful'; did you mean '--full'?" "$hapticd" bench --ful
+refused 2 "hapticd bench: --json requires --list" "$hapticd" bench --json
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 2 "excludes" "$hapticd" record Phantom@localhost --server --end --seconds 5
@@ -45,7 +47,7 @@ refused 2 "must be an integer from 0 to 2147483646" "$hapticd" touch "$source_di
 refused 2 "must be an integer from 1 to 65535" "$hapticd" doctor --port 70000
 refused 1 "--mesh does not go with --session" "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --session "$source_dir/testdata/recordings/all_commands_law2.haptics"
 refused 1 "hapticd devices" "$hapticd" serve --device openhaptics --listen 127.0.0.1:0 --http off
-refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list
+refused 1 "no system bus (D-Bus): No such file or directory; install it by 'apt install dbus'" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" list
 refused 1 "no system bus" env DBUS_SYSTEM_BUS_ADDRESS=unix:path=/nowhere "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --find
 refused 1 "--traj-unit does not go with --session" "$hapticd" render --session "$source_dir/testdata/recordings/all_commands_law2.haptics" --traj-unit m
 refused 1 "without TLS: leave out --fingerprint" "$hapticd" tunnel unix:/nowhere --fingerprint 00
@@ -210,6 +212,18 @@ if [ "$(id -u)" = 0 ] && [ "$(cat /proc/sys/net/ipv4/ip_unprivileged_port_start)
   [ "$(grep -c 'port 7 needs privileges: choose one above 1023 with --listen' "$work/said")" = 2 ] || { cat "$work/said"; exit 1; }
 fi
 
+# A loop that was stopped for 0.1 s has late ticks; rights that are granted are no remedy.
+"$hapticd" doctor --seconds 1 >"$work/said" &
+doctor=$!
+for _ in $(seq 600); do ! grep -q '^loop, ' "$work/said" || break; sleep 0.05; done
+sleep 0.3
+kill -STOP "$doctor"
+sleep 0.1
+kill -CONT "$doctor"
+wait "$doctor" && { cat "$work/said"; exit 1; }
+grep -A1 'BAD   [0-9]* ticks' "$work/said" | grep -q -e '-> .*close other programs' || { cat "$work/said"; exit 1; }
+! grep -q 'SCHED_FIFO priority 80 is granted' "$work/said" || ! grep 'realtime rights' "$work/said" || exit 1
+
 # What is interrupted leaves no file behind.
 printf 't_s,x_m,y_m,z_m\n0,0.2,0,0\n100000,0.3,0,0\n' >"$work/long.csv"
 "$hapticd" render --mesh "$source_dir/testdata/meshes/bunny.obj" --hand "$work/long.csv" --out "$work/half.csv" >"$work/said" 2>&1 &
@@ -227,6 +241,7 @@ grep -q '"program": "hapticd' "$work/out.csv.json" && grep -q '"stiffness_N_per_
 "$hapticd" info "$recording" --json | grep -q '"driver": "simulated"'
 
 # Figures: of a recording, over nothing else, and each in its format.
+refused 1 "--to must be greater than --from, 5, or 0 for the end; got 2" "$hapticd" plot "$recording" --out "$work/my.svg" --from 5 --to 2
 "$hapticd" plot "$recording" --out "$work/my.svg" | grep -q "ticks of 'Phantom' from 0.000 s"
 grep -q '<polyline' "$work/my.svg" && grep -q 'N/m</text>' "$work/my.svg" && tail -1 "$work/my.svg" | grep -qx '</svg>'
 refused 1 "--force" "$hapticd" plot "$recording" --out "$work/my.svg"

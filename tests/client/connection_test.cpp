@@ -139,6 +139,13 @@ TEST(Client, WrongNamesAreQuoted) {
   EXPECT_THAT(textOf<ConnectError>([] { Client("Phantom@nowhere.invalid"); }), HasSubstr("nowhere.invalid"));
 }
 
+TEST(Client, NothingListensOnTheUnixSocket) {
+  const std::string text =
+      textOf<ConnectError>([] { Client("Phantom@unix:/nowhere", {.connectTimeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("nothing listens on unix:/nowhere (cannot use the Unix socket /nowhere"));
+  EXPECT_THAT(text, HasSubstr("correct the path"));
+}
+
 TEST_P(BothWays, NothingListens) {
   std::uint16_t port = 0;
   std::string device;

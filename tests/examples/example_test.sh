@@ -51,7 +51,10 @@ check() {
                $1 !~ /^[0-9]+\.[0-9][0-9][0-9][0-9][0-9][0-9]$/ { bad = 1 }
                END { exit bad || !poses || !forces }' "$work/out" ;;
     example_client_dynamics)
+      # The hand touches what another client left: that does not push the box.
+      "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "$device" --seconds 1 >/dev/null
       "$example" "$device" 6 >"$work/out"
+      head -1 "$work/out" | grep -qE '^box at +-?0\.0[0-9] +-?0\.0[0-9] +-?0\.0[0-9] mm$' || return 1
       at_least 'the box moved' 5 && grep -qE '^touched in [1-9][0-9]+ ticks, at most [0-9.]+ N' "$work/out" ;;
     example_mujoco)
       "$example" --help 2>"$work/help" && return 1

@@ -214,7 +214,8 @@ TEST_F(Rerender, RecordingBegunWhileTheServerRunsReplaysItsScene) {
     };
     ASSERT_TRUE(hold(18, true));
     peer.send(wire::RecordingControl{.record = 1, .name = std::string_view(name)});
-    ASSERT_TRUE(peer.untilText("refused: this server records to"));
+    ASSERT_TRUE(
+        peer.untilText("already; end that recording first ('hapticd record NAME@HOST --server --end')"));
     peer.forget();
     peer.send(wire::RecordingControl{.record = 0, .name = std::string_view(name)});
     ASSERT_TRUE(peer.untilText("refused: this server records to"));

@@ -121,7 +121,7 @@ class HapticdTeleop(Teleoperator):
             raise
 
     def _log(self, report: hapticd.TextReport) -> None:
-        """What the server says, such as why it refuses a feedback, is to be seen: otherwise nothing is felt, and nobody knows why."""
+        """Logs texts from the server, such as the reason of a refused feedback: without it, nobody would know why nothing is felt."""
         _LOG.log(_LEVELS.get(report.severity, logging.INFO), "%s: %s", self.config.device, report.text)
 
     @property

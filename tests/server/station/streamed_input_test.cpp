@@ -86,6 +86,8 @@ TEST_F(StreamedInputTest, LimitsWhatIsTooFastTooLongOrTooStiff) {
   const StreamedInput::Answer answer = send(n);
   EXPECT_TRUE(answer.taken);
   EXPECT_THAT(answer.text.text, HasSubstr("unstable"));
+  EXPECT_THAT(answer.text.text, HasSubstr("; damping"));
+  EXPECT_THAT(answer.text.text, testing::Not(testing::EndsWith("; ")));
   EXPECT_EQ(answer.text.code, RefusalCode::none);
   EXPECT_NEAR(first().velocity_m_per_s.norm(), 1, 1e-12);
   EXPECT_NEAR(first().angularVelocity_rad_per_s.norm(), 20, 1e-9);
