@@ -172,6 +172,22 @@ test("a refused mesh is not said to be on its way, and the reason is shown", asy
   await end(viewer, server);
 });
 
+test("a mesh whose connection ends before the server has read it is not said to be on its way for ever", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.ask("void (viewer.link.socket.send = () => undefined)"); // what the browser has sent waits in the network
+  await viewer.page.click("#load-bunny");
+  await viewer.until("it is sent", async () => /processing/.test(await viewer.text("#drop-panel")));
+  await viewer.ask("viewer.link.socket.close()");
+  await viewer.until("the reason", async () => /bunny\.obj: .*Load it again if it is missing/.test(await viewer.text("#drop-panel")));
+  await viewer.connected();
+  assert.equal((await server.state()).scenes[0].objects[0].triangles, 0);
+  await viewer.page.getByRole("button", { name: "Close" }).click();
+  await viewer.page.click("#load-bunny");
+  await viewer.until("it arrives", async () => /is now object 0 with 3,674/.test(await viewer.text("#drop-panel")));
+  await end(viewer, server);
+});
+
 test("a mesh whose place another program took is not said to be there", async () => {
   const server = await Server.start(hapticd);
   const viewer = await opened(server);

@@ -70,9 +70,12 @@ export class DropMesh {
     }
   }
 
-  /** The states that follow are of another scene. */
+  /** The connection was lost, or the states that follow are of another scene. */
   clear(): void {
+    const unseen = this.last?.way.isUnderWay() ? this.last.name : "";
     this.targets.clear();
+    if (unseen !== "")
+      this.show(`${unseen}: the connection or the scene changed before it was seen there. Load it again if it is missing.`, "bad");
   }
 
   /** A mesh that is being placed was placed in the workspace of another device, or in another scene. */
