@@ -188,6 +188,25 @@ test("a mesh whose connection ends before the server has read it is not said to 
   await end(viewer, server);
 });
 
+test("a mesh fits into a workspace that is turned, and does not replace an object that is gone", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const size = await viewer.ask(`(() => {
+    // 160 x 120 x 70 mm, with its x axis up.
+    const device = { ...viewer.device, T_world_device: [0, 1000, 0, 0, -1000, 0, 0, 0, 0, 0, 1000, 0, 0, 0, 0, 1] };
+    const mesh = { positions: Float32Array.of(0, 0, 0, 1, 10, 0, 0, 10, 1), triangles: Uint32Array.of(0, 1, 2) };
+    const placing = viewer.drop.newPlacing("tall.obj", mesh, device);
+    placing.target.append(new Option("replace object 99", "99"));
+    placing.target.value = "99";
+    document.querySelector("#drop-panel").hidden = false;
+    viewer.drop.load("tall.obj", mesh, placing);
+    return placing.size.valueAsNumber;
+  })()`);
+  assert.equal(size, 128);
+  await viewer.until("the reason", async () => /tall\.obj: object 99 was removed/.test(await viewer.text("#drop-panel")));
+  await end(viewer, server);
+});
+
 test("a mesh whose place another program took is not said to be there", async () => {
   const server = await Server.start(hapticd);
   const viewer = await opened(server);
