@@ -109,9 +109,14 @@ void checkFiles(const server::ServerConfig& config, const ServeOptions& options)
     }
   };
   check("tokens", [&] { server::Credentials(config, geteuid()); });
-  check("tls", [&] {
-    if (!config.tlsKey.empty()) tls::Context::server(config.tls, config.tlsKey);
-  });
+  if (config.tlsKey.empty()) return;
+  try {
+    tls::Context::server(config.tls, config.tlsKey);
+  } catch (const tls::KeyError&) {
+    check("tls_key", [] { throw; });
+  } catch (const tls::Error&) {
+    check("tls", [] { throw; });
+  }
 }
 
 server::ServerConfig configOf(const ServeOptions& options, std::vector<std::string>& remarks) {

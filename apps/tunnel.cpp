@@ -1,4 +1,7 @@
 // hapticd tunnel: a local port whose connections travel to a server on another machine through TLS.
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -15,6 +18,7 @@
 #include "net/local_socket.h"
 #include "net/tcp_listener.h"
 #include "net/udp_socket.h"
+#include "server/session/throttled_log.h"
 #include "stop_signals.h"
 #include "tls/tls.h"
 #include "token_file.h"
@@ -67,7 +71,8 @@ net::Buffer identification(const std::string& token) {
 // then.
 class Carrier : public std::enable_shared_from_this<Carrier> {
  public:
-  Carrier(net::Connection near, net::Connection far, net::Buffer afterCookie, std::function<void()> onGone)
+  Carrier(net::Connection near, net::Connection far, net::Buffer afterCookie,
+          std::function<void(const std::string& why)> onGone)
       : near_(std::move(near)),
         far_(std::move(far)),
         afterCookie_(std::move(afterCookie)),
@@ -84,10 +89,9 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
 
   void end(const std::string& why) {
     if (!onGone_) return;
-    std::fprintf(stderr, "hapticd: client disconnected: %s\n", why.c_str());
     near_.close(why);
     far_.close(why);
-    std::exchange(onGone_, nullptr)();
+    std::exchange(onGone_, nullptr)(why);
   }
 
  private:
@@ -125,7 +129,7 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   net::Connection far_;
   const net::Buffer afterCookie_;
   std::size_t seen_ = 0;
-  std::function<void()> onGone_;
+  std::function<void(const std::string& why)> onGone_;
 };
 
 tls::Context contextOf(const TunnelOptions& options, const std::string& host) {
@@ -156,6 +160,9 @@ void tryOnce(net::Loop& loop, const Connect& connect, const std::string& server)
 }
 
 int run(const TunnelOptions& options) {
+  spdlog::set_default_logger(spdlog::stderr_logger_st("tunnel"));
+  spdlog::set_pattern("hapticd: %v");
+  server::ThrottledLog log;  // a client tries again while the server cannot be reached
   const client::ServerAddress server = client::parseServer(options.server);
   net::Loop loop;
   std::optional<tls::Context> context;
@@ -174,6 +181,7 @@ int run(const TunnelOptions& options) {
   link.keepAlive = 1s;
   link.closeTimeout = 24h;  // as long as the peer takes what is queued: nobody waits for it
   const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
+  const auto tell = [&log](const std::string& why) { log.warnOfLasting("client disconnected: " + why); };
   const Connect connect = [&] {
     if (!context) return net::connectLocal(loop, server.socket, link);
     const net::Endpoint address{host->address(), server.port};
@@ -188,13 +196,20 @@ int run(const TunnelOptions& options) {
   net::TcpListener listener(
       loop, local,
       [&](net::Connection near) {
-        net::Connection far = connect();
+        net::Connection far;
+        try {
+          far = connect();
+        } catch (const net::Error& error) {  // the Unix socket is gone
+          return tell(error.what());
+        }
         carriers.emplace_back();
         const auto place = std::prev(carriers.end());
-        *place = std::make_shared<Carrier>(std::move(near), std::move(far), token, [&loop, &carriers, place] {
-          // After its last callback, and with time to send what is queued.
-          loop.post([&carriers, place] { carriers.erase(place); });
-        });
+        *place = std::make_shared<Carrier>(std::move(near), std::move(far), token,
+                                           [&loop, &carriers, &tell, place](const std::string& why) {
+                                             tell(why);
+                                             // After its last callback, and with time to send what is queued.
+                                             loop.post([&carriers, place] { carriers.erase(place); });
+                                           });
         (*place)->start();
       },
       link, "--port");
@@ -213,7 +228,14 @@ int run(const TunnelOptions& options) {
   const StopSignals signals;
   std::printf("clients open NAME@tcp://%s; connections go to %s\n", at.c_str(), server.text().c_str());
   std::fflush(stdout);
-  while (!stopRequested()) loop.runOnce(200ms);
+  auto reportedAt = std::chrono::steady_clock::now();
+  while (!stopRequested()) {
+    loop.runOnce(200ms);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - reportedAt < 1s) continue;
+    reportedAt = now;
+    log.reportSuppressed();
+  }
   for (const std::shared_ptr<Carrier>& carrier : std::list(carriers)) carrier->end("the tunnel ends");
   loop.runOnce(0ms);  // forgets them
   return 0;

@@ -678,8 +678,10 @@ class Core(Commands):
         return f"no VRPN server at {server}: {failure or 'no answer'}"
 
     def _no_device(self) -> str:
-        others = ", ".join(map(printable, self._server_devices)) or "no other device"
-        return f"no device '{self.device}' answers at {self.server}; it has {others}"
+        others = ", ".join(map(printable, self._server_devices))
+        # A server that hangs after its greeting has named nothing either.
+        has = f"it has {others}" if others else "it has named none: it has no device, or it hangs"
+        return f"no device '{self.device}' answers at {self.server}; {has}"
 
     def statistics(self) -> Statistics:
         """Counts since the client was constructed: a copy."""

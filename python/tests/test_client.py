@@ -612,6 +612,13 @@ def test_what_is_wrong_with_a_connection_is_named(server: Server) -> None:
         until(nobody, lambda: nobody._server_devices)
         with pytest.raises(hapticd.ConnectError, match=r"no device 'Nobody' answers at 127.0.0.1:\d+; it has Phantom"):
             nobody.wait_connected(0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        name = f"Phantom@tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with hapticd.connect(name, connect_timeout=0) as client:
+            peer, _ = silent.accept()
+            with peer, pytest.raises(hapticd.ConnectError, match="it has named none: it has no device, or it hangs"):
+                peer.sendall(b"vrpn: ver. 07.38  0".ljust(24, b"\0"))
+                client.wait_connected(0.3)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     with pytest.raises(hapticd.ConnectError, match="nothing listens on 127.0.0.1"):

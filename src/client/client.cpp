@@ -26,13 +26,14 @@ client::LinkOptions linkOptions(const ClientOptions& options) {
           .queueLimit_bytes = std::max<std::size_t>(options.queueLimit_bytes, 1)};
 }
 
-std::string joined(const std::vector<std::string>& names) {
+// A server that hangs after its greeting has named nothing either.
+std::string whatServerHas(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) {
     if (name == "VRPN Control") continue;
-    text += (text.empty() ? "" : ", ") + base::printable(name);
+    text += (text.empty() ? "it has " : ", ") + base::printable(name);
   }
-  return text.empty() ? "no other device" : text;
+  return text.empty() ? "it has named none: it has no device, or it hangs" : text;
 }
 
 }  // namespace
@@ -56,8 +57,8 @@ void Client::Impl::waitConnected(Duration timeout) {
   const Duration left = timeout - Duration(base::now() - start);
   if (!link.waitHeard(sender, std::max(left, kShortestAnswer))) {
     if (!link.connected()) throw ConnectError(device + ": " + link.whyNotConnected());
-    throw ConnectError("no device '" + device + "' answers at " + server + "; it has " +
-                       joined(link.serverDevices()));
+    throw ConnectError("no device '" + device + "' answers at " + server + "; " +
+                       whatServerHas(link.serverDevices()));
   }
 }
 

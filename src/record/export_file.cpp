@@ -19,6 +19,8 @@ ExportFile::ExportFile(const std::filesystem::path& path, Unfinished unfinished)
   namespace fs = std::filesystem;
   std::error_code none;
   const fs::file_type type = fs::status(path, none).type();
+  const fs::file_type entry = fs::symlink_status(path, none).type();
+  isPlain_ = entry == fs::file_type::regular || entry == fs::file_type::not_found;
   if (unfinished == Unfinished::kept ||
       (type != fs::file_type::regular && type != fs::file_type::not_found)) {
     create(base::Existing::replace);
@@ -48,11 +50,21 @@ void ExportFile::failToCreate(const std::error_code& why) const {
                        "; name a file in a directory that can be written");
 }
 
+void ExportFile::removeEmpty() const noexcept {
+  base::Files& files = base::world().files;
+  try {
+    if (files.open(written_)->size() == 0) files.remove(written_);
+  } catch (const std::exception&) {
+    // It is gone, or stays.
+  }
+}
+
 ExportFile::~ExportFile() {
   if (!file_) return;
   try {
     if (written_ == target_) {
-      close();
+      if (!failed_) close();
+      file_.reset();
     } else {
       file_.reset();
       base::world().files.remove(written_);
@@ -60,6 +72,7 @@ ExportFile::~ExportFile() {
   } catch (const std::exception&) {
     // A destructor cannot report it: callers that need the file whole call close().
   }
+  if (failed_ && isPlain_) removeEmpty();
 }
 
 void ExportFile::write(ByteView bytes) {
@@ -72,6 +85,7 @@ void ExportFile::flush() {
   try {
     file_->write(bytes);
   } catch (const std::system_error& error) {
+    failed_ = true;
     throw RecordingError("writing '" + path_.string() + "' failed: " + error.code().message() +
                          "; make room on the disk");
   }

@@ -12,7 +12,7 @@ namespace hapticd::record {
 
 /// What becomes of a file that is not closed, because an error came first.
 enum class Unfinished {
-  kept,    ///< the file has what was written: for what cannot be made again
+  kept,    ///< the file has what was written, if that is anything: for what cannot be made again
   dropped  ///< there is none, and a file that it would have replaced stays as it was
 };
 
@@ -35,13 +35,16 @@ class ExportFile {
 
  private:
   void create(base::Existing existing);
+  void removeEmpty() const noexcept;
   [[noreturn]] void failToCreate(const std::error_code& why) const;
 
   const std::filesystem::path path_;
   std::filesystem::path target_;   // without a symbolic link, which a renaming would replace
   std::filesystem::path written_;  // a new one beside it until the file is whole, or the same
+  bool isPlain_;                   // neither a link nor a device, which others made
   std::unique_ptr<base::OutputFile> file_;
   Bytes pending_;
+  bool failed_ = false;  // to write
 };
 
 }  // namespace hapticd::record

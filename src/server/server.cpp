@@ -106,6 +106,10 @@ bool Server::isNear(std::uint32_t address) const {
   return std::any_of(trusted_.begin(), trusted_.end(), [&](const Subnet& s) { return s.has(address); });
 }
 
+bool Server::isEncrypted(const Session& session) const {
+  return tls_ && session.mode() == SessionMode::tcp && !isNear(session.remote().address);
+}
+
 // An empty connection: refused.
 net::Connection Server::secured(net::Connection connection) {
   if (isNear(connection.remote().address)) return connection;
@@ -345,7 +349,8 @@ std::optional<HaplyOwner::Refused> Server::refuseHaply(const net::Endpoint& remo
   } else if (!admission_.hasRoom(sourceOf(address))) {
     refused = {503, "the server is full"};
   }
-  if (refused) throttledLog_.warn("haply connection from " + address + " refused: " + refused->reason);
+  if (refused)
+    throttledLog_.warnOfLasting("haply connection from " + address + " refused: " + refused->reason);
   return refused;
 }
 
@@ -437,9 +442,12 @@ Session& Server::addSession(net::Connection connection, std::unique_ptr<net::Udp
   const scene::ClientId id = nextClient_++;
   auto session =
       std::make_unique<Session>(id, *this, names_, clock_, std::move(connection), std::move(udp), mode);
-  throttledLog_.log(spdlog::level::info, session->address(),
-                    fmt::format("client {} connected from {}", id, session->description()));
   Session& added = *session;
+  // One that may fail at TLS is named once it speaks VRPN.
+  if (!isEncrypted(added)) {
+    throttledLog_.log(spdlog::level::info, added.address(),
+                      fmt::format("client {} connected from {}", id, added.description()));
+  }
   added.setIdentity(credentials_.identityOf(added.remote().address, added.user()));
   added.setMostPerSecond(config_.limits.commandsPerSecond);
   admission_.enter(added);
@@ -462,9 +470,14 @@ void Server::onEnding(Session& session) {
 }
 
 void Server::onClosed(Session& session, const std::string& reason) {
-  throttledLog_.log(
-      spdlog::level::info, session.address(),
-      fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
+  if (session.greeted() || !isEncrypted(session)) {
+    throttledLog_.log(
+        spdlog::level::info, session.address(),
+        fmt::format("client {} ({}) disconnected: {}", session.id(), session.description(), reason));
+  } else {
+    // A client without TLS, or that knows another certificate, tries again and again.
+    throttledLog_.warnOfLasting("connection from " + session.remote().addressText() + " ended: " + reason);
+  }
   std::vector<std::pair<const Station*, wire::Text>> texts;
   for (const auto& station : stations_) {
     if (auto text = station->sessionGone(session)) texts.emplace_back(station.get(), std::move(*text));

@@ -99,6 +99,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   void openPorts();
   void openSocket();
   bool isNear(std::uint32_t address) const;
+  bool isEncrypted(const Session& session) const;
   net::Connection secured(net::Connection connection) override;
   void onIdentify(Session& session, const wire::MessageReceived& message);
   void identify(Session& session, std::string_view token, wire::LocalSender name);
@@ -151,6 +152,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   struct Refusal {
     std::string reason;
     base::Nanos until = 0;
+    int times = 0;  ///< it was heard
   };
   std::map<scene::ClientId, std::map<std::pair<wire::LocalSender, wire::MessageKind>, Refusal>> refusals_;
   std::vector<net::Subscription> subscriptions_;

@@ -13,6 +13,8 @@ namespace hapticd::server {
 using base::Nanos;
 
 constexpr Nanos kRefusalPeriod = 1'000'000'000;
+// A program that sends one batch after the other learns of each what became of it.
+constexpr int kRefusedCommits = 20;
 
 // Dispatch by role: control messages never wait for the scene.
 void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
@@ -190,22 +192,30 @@ bool Server::isPermitted(Session& session, Station& station, const wire::Message
 // A batch is whole: what its client may do when it begins holds until its commit.
 bool Server::mayCommand(Session& session, Station& station, const wire::MessageReceived& message) {
   SceneHost& scene = station.scene();
-  std::string reason = "it belongs to a batch that was refused";
+  std::string reason;
   const std::optional<bool> batch =
       wire::role(message.kind) == wire::Role::scene ? scene.batchOf(session.id()) : std::nullopt;
   const bool permitted = batch ? *batch : isPermitted(session, station, message, reason);
-  if (message.kind == wire::kindOf<wire::BatchBegin>) scene.beginBatch(session.id(), permitted);
+  const bool ofRefusedBatch = batch && !permitted;
+  if (ofRefusedBatch) reason = scene.refusalOfBatch(session.id());
+  if (message.kind == wire::kindOf<wire::BatchBegin>)
+    scene.beginBatch(session.id(), permitted ? std::nullopt : std::optional(reason));
   if (message.kind == wire::kindOf<wire::BatchCommit>) scene.endBatch(session.id());
   if (permitted) return true;
   // A refused upload has thousands of messages, a stream a thousand in each second.
   Refusal& refusal = refusals_[session.id()][{message.local_sender, message.kind}];
   const Nanos now = base::now();
-  if (now < refusal.until && refusal.reason == reason) return false;
-  refusal = {reason, now + kRefusalPeriod};
+  const int most = message.kind == wire::kindOf<wire::BatchCommit> ? kRefusedCommits : 1;
+  const bool isNew = now >= refusal.until || refusal.reason != reason;
+  if (isNew) refusal = {reason, now + kRefusalPeriod};
+  if (refusal.times == most) return false;
+  ++refusal.times;
   session.send(message.local_sender,
                wire::Text{.severity = wire::kTextError,
-                          .level = static_cast<std::uint32_t>(RefusalCode::notPermitted),
-                          .text = std::string(wire::info(message.kind).name) + " refused: " + reason});
+                          .level = static_cast<std::uint32_t>(ofRefusedBatch ? RefusalCode::batchRefused
+                                                                             : RefusalCode::notPermitted),
+                          .text = std::string(wire::info(message.kind).name) +
+                                  (ofRefusedBatch ? " refused with its batch: " : " refused: ") + reason});
   return false;
 }
 

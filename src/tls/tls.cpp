@@ -72,9 +72,9 @@ void requirePrivate(const std::string& file) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::perms mode = fs::status(file, error).permissions();
-  if (error) throw Error("TLS: cannot read the key '" + file + "': " + error.message());
+  if (error) throw KeyError("TLS: cannot read the key '" + file + "': " + error.message());
   if ((mode & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none)
-    throw Error("TLS: others than its owner may use the key '" + file + "': chmod 0600 " + file);
+    throw KeyError("TLS: others than its owner may use the key '" + file + "': chmod 0600 " + file);
 }
 
 SslContext newContext(const SSL_METHOD* method) {
@@ -127,7 +127,7 @@ Context Context::server(const std::string& certificateFile, const std::string& k
     throw Error("TLS: cannot use the certificate '" + certificateFile + "': " + reason());
   if (SSL_CTX_use_PrivateKey_file(context, keyFile.c_str(), SSL_FILETYPE_PEM) != 1 ||
       SSL_CTX_check_private_key(context) != 1)
-    throw Error("TLS: cannot use the key '" + keyFile + "' with '" + certificateFile + "': " + reason());
+    throw KeyError("TLS: cannot use the key '" + keyFile + "' with '" + certificateFile + "': " + reason());
   impl->fingerprint = fingerprintOf(SSL_CTX_get0_certificate(context));
   return Context(std::move(impl));
 }

@@ -15,6 +15,12 @@ class Error : public net::Error {
   using net::Error::Error;
 };
 
+/// A key that cannot be used, or not with the certificate.
+class KeyError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// The settings of one side, shared by its connections. Immutable; any thread.
 class Context {
  public:

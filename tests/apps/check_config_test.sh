@@ -48,8 +48,10 @@ fails_with "device 'Phantom': wheel_profile: wheel.toml:2: unknown key 'axis'; d
 printf '\ntokens = "nosuch"\n' >tokens.toml
 fails_with "tokens.toml:2: tokens: cannot read 'nosuch'" --config tokens.toml
 printf '\ntls = "%s/nosuch.pem"\ntls_key = "%s/nosuch.key"\n' "$work" "$work" >tls.toml
-fails_with "tls.toml:2: " --config tls.toml
-fails_with "nosuch" --config tls.toml
+fails_with "tls.toml:3: TLS: cannot read the key '$work/nosuch.key'" --config tls.toml
+(umask 077 && : >empty.key)
+printf '\ntls = "%s/nosuch.pem"\ntls_key = "%s/empty.key"\n' "$work" "$work" >tls.toml
+fails_with "tls.toml:2: TLS: cannot use the certificate '$work/nosuch.pem'" --config tls.toml
 fails_with "hardware is 'x', expected the number" --device forcedimension:x
 fails_with "has no hardware to choose from" --device simulated:left
 fails_with "the driver 'evdev' is led by its own hand" --device evdev --hand script.csv

@@ -11,6 +11,7 @@
 
 #include "net/loop_impl.h"
 #include "net/network.h"
+#include "wire/cookie.h"
 #include "wire/udp_request.h"
 
 namespace hapticd::test {
@@ -165,6 +166,14 @@ TEST(Client, NoSuchDevice) {
       [&] { Client("Phantm@tcp://127.0.0.1:" + std::to_string(server.port()), {.connectTimeout = 300ms}); });
   EXPECT_THAT(text, HasSubstr("no device 'Phantm' answers"));
   EXPECT_THAT(text, HasSubstr("it has Phantom"));
+}
+
+TEST(Client, AServerThatIsSilentAfterItsGreetingIsNotSaidToHaveNoDevice) {
+  const auto cookie = wire::encodeCookie(0);
+  ScriptedServer server({.greetingBytes = {reinterpret_cast<const char*>(cookie.data()), cookie.size()}});
+  const std::string text = textOf<ConnectError>([&] { Client(server.tcpName(), {.connectTimeout = 300ms}); });
+  EXPECT_THAT(text, HasSubstr("no device 'Phantom' answers"));
+  EXPECT_THAT(text, HasSubstr("it has named none: it has no device, or it hangs"));
 }
 
 TEST(Client, NamesOfDevicesDoNotReachTheTerminalAsTheyAre) {

@@ -139,6 +139,26 @@ TEST(ExportFile, AFullDiskKeepsTheFileThatWasToBeReplaced) {
   EXPECT_EQ(world.files.list("/"), std::vector<std::string>{"my.csv"});
 }
 
+TEST(ExportFile, OfAFullDiskNoEmptyFileIsLeft) {
+  base::FakeWorld world;
+  world.files.freeBytes = 0;
+  for (const bool closed : {true, false}) {
+    ExportFile kept("/my.csv", Unfinished::kept);
+    kept.write("head");
+    if (closed) {
+      EXPECT_THROW(kept.close(), RecordingError);
+    }
+  }
+  EXPECT_EQ(world.files.list("/"), std::vector<std::string>{});
+  world.files.freeBytes = 3;
+  {
+    ExportFile kept("/my.csv", Unfinished::kept);
+    kept.write("head");
+    EXPECT_THROW(kept.flush(), RecordingError);
+  }
+  EXPECT_EQ(world.files.text("/my.csv"), "hea");
+}
+
 // Of a vrpn.cfg in Latin-1. Readers of CSV and MCAP refuse a whole file for such a byte.
 TEST(Export, NamesThatAreNotUtf8AreMadeSo) {
   Sample sample;

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -224,13 +225,16 @@ TEST_F(ControlTest, ABatchIsTakenOrRefusedAsAWhole) {
   ASSERT_TRUE(first->untilNext<wire::Pong>());
   second->send(wire::BatchBegin{});
   ASSERT_TRUE(second->untilText("hapticd Batch_Begin refused: client"));
+  EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
   first->send(wire::ReleaseControl{});
   first->send(wire::Ping{});
   ASSERT_TRUE(first->untilNext<wire::Pong>());
   second->send(kUp);
-  ASSERT_TRUE(second->untilText("Force_Field refused: it belongs to a batch that was refused"));
+  ASSERT_TRUE(second->untilText("Force_Field refused with its batch: client"));
+  EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::batchRefused));
   second->send(wire::BatchCommit{});
-  ASSERT_TRUE(second->untilText("Batch_Commit refused: it belongs to a batch that was refused"));
+  ASSERT_TRUE(second->untilText("Batch_Commit refused with its batch: client"));
+  EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::batchRefused));
   // The next one is its own, and keeps control until its commit.
   second->send(wire::BatchBegin{});
   second->send(kUp);
@@ -243,6 +247,38 @@ TEST_F(ControlTest, ABatchIsTakenOrRefusedAsAWhole) {
   ASSERT_TRUE(second->untilNext<wire::Pong>());
   first->send(wire::ForceField{});
   EXPECT_TRUE(untilForce(*first, 0));
+}
+
+// A program that sends one batch after the other learns of each what became of it, and not only of the first
+// one in a second.
+TEST_F(ControlTest, EachRefusedBatchIsToldAtItsCommitButNoStreamOfThem) {
+  serveFirst();
+  auto first = peer();
+  const auto second = peer();
+  first->send(wire::SetObjectNumber{1});
+  first->send(wire::Ping{});
+  ASSERT_TRUE(first->untilNext<wire::Pong>());
+  const auto commits = [&] {
+    return std::count_if(second->texts().begin(), second->texts().end(), [](const wire::Text& text) {
+      return text.text.text.find("Batch_Commit refused") != std::string::npos;
+    });
+  };
+  const auto send = [&](int batches) {
+    for (int i = 0; i < batches; ++i) {
+      second->send(wire::BatchBegin{});
+      second->send(kUp);
+      second->send(wire::BatchCommit{});
+    }
+    second->send(wire::Ping{});
+    return second->untilNext<wire::Pong>();
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(send(3));
+  EXPECT_EQ(commits(), 3);
+  ASSERT_TRUE(send(200));
+  const auto seconds =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::steady_clock::now() - begin);
+  EXPECT_LE(commits(), 20 * (1 + seconds.count()));
 }
 
 TEST_F(ControlTest, OnlyASceneCommandTakesControl) {

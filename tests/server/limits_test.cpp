@@ -91,6 +91,23 @@ TEST(Limits, LinesThatClientsCauseAreCountedBeyondTheirNumberAndTheirBytes) {
   EXPECT_EQ(log.count("a stranger"), 21U) << "in the next second";
 }
 
+TEST(Limits, AClientWithoutTlsThatTriesAgainIsLoggedOnce) {
+  LogLines log;
+  server::ServerConfig config = RunningServer::anyPort();
+  config.tls = server::kTlsGenerated;
+  config.tlsLoopback = true;
+  {
+    RunningServer server(config);
+    for (int i = 0; i < 3; ++i) {
+      ScriptedPeer peer(server.address(), "Phantom", ScriptedPeer::Mode::tcp, ScriptedPeer::Speech::raw);
+      peer.sendBytes(std::as_bytes(std::span(std::string_view("vrpn: ver. 07.38  0"))));
+      ASSERT_TRUE(peer.untilClosed());
+    }
+  }
+  EXPECT_EQ(log.count("connection from 127.0.0.1 ended: TLS handshake failed"), 1U) << log.text();
+  EXPECT_EQ(log.count("client "), 0U) << log.text();
+}
+
 // Such as a client that is refused and tries again four times a second, all night.
 TEST(Limits, ACauseThatLastsIsLoggedOnceAMinute) {
   LogLines log;

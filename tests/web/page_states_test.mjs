@@ -151,7 +151,17 @@ test("a refused mesh is not said to be on its way, and the reason is shown", asy
   await viewer.settle();
   assert.doesNotMatch(await viewer.text("#drop-panel"), /processing|Sending/);
   assert.match(await viewer.text("#toasts"), /Batch_Begin refused: your role is observer/);
-  assert.doesNotMatch(await viewer.text("#toasts"), /belongs to a batch/);
+  assert.doesNotMatch(await viewer.text("#toasts"), /with its batch/);
+  // Another one in the same second.
+  for (const name of ["one.obj", "two.obj"]) {
+    await viewer.drop({ [name]: "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" });
+    await viewer.page.getByRole("button", { name: "Load into the scene" }).click();
+  }
+  await viewer.until("the reason", async () =>
+    /two\.obj: .*your role is observer; present the token/.test(await viewer.text("#drop-panel")));
+  await viewer.settle();
+  assert.doesNotMatch(await viewer.text("#drop-panel"), /processing|Sending/);
+  assert.deepEqual(await viewer.ask("viewer.drop.targets.underWay"), []);
   await viewer.page.getByRole("button", { name: "Close" }).click();
   await viewer.page.fill("#token-text", "0123456789abcdef0123456789abcdef");
   await viewer.page.press("#token-text", "Enter");
@@ -159,6 +169,41 @@ test("a refused mesh is not said to be on its way, and the reason is shown", asy
   await viewer.until("the button", () => viewer.page.isVisible("#load-bunny"));
   await viewer.page.click("#load-bunny");
   await viewer.until("it arrives", async () => /is now object 0 with 3,674/.test(await viewer.text("#drop-panel")));
+  await end(viewer, server);
+});
+
+test("a mesh whose connection ends before the server has read it is not said to be on its way for ever", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.ask("void (viewer.link.socket.send = () => undefined)"); // what the browser has sent waits in the network
+  await viewer.page.click("#load-bunny");
+  await viewer.until("it is sent", async () => /processing/.test(await viewer.text("#drop-panel")));
+  await viewer.ask("viewer.link.socket.close()");
+  await viewer.until("the reason", async () => /bunny\.obj: .*Load it again if it is missing/.test(await viewer.text("#drop-panel")));
+  await viewer.connected();
+  assert.equal((await server.state()).scenes[0].objects[0].triangles, 0);
+  await viewer.page.getByRole("button", { name: "Close" }).click();
+  await viewer.page.click("#load-bunny");
+  await viewer.until("it arrives", async () => /is now object 0 with 3,674/.test(await viewer.text("#drop-panel")));
+  await end(viewer, server);
+});
+
+test("a mesh fits into a workspace that is turned, and does not replace an object that is gone", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const size = await viewer.ask(`(() => {
+    // 160 x 120 x 70 mm, with its x axis up.
+    const device = { ...viewer.device, T_world_device: [0, 1000, 0, 0, -1000, 0, 0, 0, 0, 0, 1000, 0, 0, 0, 0, 1] };
+    const mesh = { positions: Float32Array.of(0, 0, 0, 1, 10, 0, 0, 10, 1), triangles: Uint32Array.of(0, 1, 2) };
+    const placing = viewer.drop.newPlacing("tall.obj", mesh, device);
+    placing.target.append(new Option("replace object 99", "99"));
+    placing.target.value = "99";
+    document.querySelector("#drop-panel").hidden = false;
+    viewer.drop.load("tall.obj", mesh, placing);
+    return placing.size.valueAsNumber;
+  })()`);
+  assert.equal(size, 128);
+  await viewer.until("the reason", async () => /tall\.obj: object 99 was removed/.test(await viewer.text("#drop-panel")));
   await end(viewer, server);
 });
 
@@ -363,6 +408,175 @@ test("of two fingers, both move the camera and none the hand", async () => {
   await end(viewer, server);
 });
 
+test("a pinch does not take the hand, and a tap does", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const session = await browser.context.newCDPSession(viewer.page);
+  const { x, y } = await viewer.ask(`(() => {
+    const { left, top, width, height } = document.querySelector("#view").getBoundingClientRect();
+    return { x: left + width / 2, y: top + height / 2 };
+  })()`);
+  // As events of one task, so that a busy machine makes no pause between the fingers.
+  const pinch = viewer.ask(`(() => {
+    let took = false;
+    const { canvas } = viewer.view;
+    const fire = (type, pointerId, dx) => {
+      const at = { clientX: ${x} + dx, clientY: ${y}, pointerId, isPrimary: pointerId === 101, pointerType: "touch", bubbles: true, buttons: 1 };
+      canvas.dispatchEvent(new PointerEvent(type, at));
+      took ||= viewer.hand.held;
+    };
+    canvas.setPointerCapture = canvas.releasePointerCapture = () => undefined; // of pointers that the browser does not know
+    fire("pointerdown", 101, 50);
+    fire("pointermove", 101, 53);
+    fire("pointerdown", 102, -50);
+    for (let i = 1; i <= 20; ++i) { fire("pointermove", 101, 53 + 5 * i); fire("pointermove", 102, -50 - 5 * i); }
+    fire("pointerup", 102, -150);
+    fire("pointerup", 101, 153);
+    delete canvas.setPointerCapture;
+    delete canvas.releasePointerCapture;
+    return took;
+  })()`);
+  assert.equal(await pinch, false);
+  await viewer.settle(300);
+  assert.equal(await viewer.ask("viewer.hand.held"), false);
+  await session.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [{ x, y, id: 0 }] });
+  await session.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+  await viewer.until("the hand", () => viewer.ask("viewer.hand.held && !viewer.hand.dragging"));
+  await viewer.letGo();
+  await end(viewer, server);
+});
+
+test("two quick clicks on Record begin one recording, and the button says its state once", async () => {
+  const config = await file("record.toml", `record = ${JSON.stringify(join(folder, "once.haptics"))}\n[[device]]\nname = "Phantom"\n`);
+  const server = await Server.start(hapticd, { more: ["--config", config] });
+  const viewer = await opened(server);
+  const button = viewer.page.locator("#record");
+  await viewer.until("the recording of the configuration", async () => (await button.innerText()) === "End recording");
+  assert.equal(await button.getAttribute("aria-pressed"), null);
+  await viewer.ask(`(() => {
+    viewer.asked = 0;
+    const { send } = viewer.link;
+    viewer.link.send = function (...messages) {
+      viewer.asked += messages.filter((m) => m.name.includes("Recording_Control")).length;
+      return send.apply(this, messages);
+    };
+  })()`);
+  await viewer.ask("(() => { const b = document.querySelector('#record'); b.click(); b.click(); })()");
+  assert.equal(await viewer.ask("viewer.asked"), 1);
+  await viewer.until("its end", async () => (await button.innerText()) === "Record");
+  await button.dblclick();
+  await viewer.until("another one", async () => (await button.innerText()) === "End recording");
+  assert.equal(await viewer.ask("viewer.asked"), 2);
+  // A refusal leaves the button as it was: another page ended the recording, and this one did not know it yet.
+  await viewer.ask("viewer.recording = false");
+  await viewer.ask("(() => { document.querySelector('#record').click(); })()");
+  await viewer.until("the refusal", async () => (await viewer.text("#toasts")).includes("Recording_Control"));
+  await viewer.until("the button", () => viewer.ask("viewer.recording && performance.now() >= viewer.recordAgainAt_ms"));
+  await button.click();
+  await viewer.until("its end", async () => (await button.innerText()) === "Record");
+  await end(viewer, server);
+});
+
+test("another scene is shown without what was done to the one before", async () => {
+  const config = await file("scenes.toml", '[[device]]\nname = "A"\nscene = "a"\n[[device]]\nname = "B"\nscene = "b"\n');
+  const server = await Server.start(hapticd, { more: ["--config", config] });
+  const viewer = await opened(server);
+  const add = async () => {
+    await viewer.page.getByRole("button", { name: "Add" }).click();
+    await viewer.until("the effect", () => viewer.page.locator('[data-effect="0"]').isVisible());
+  };
+  const choose = async (device) => {
+    await viewer.page.selectOption("#device", device);
+    await viewer.until("its ticks", () => viewer.ask(`viewer.device.name === "${device}" && viewer.tick !== undefined`));
+  };
+  const stopped = () => viewer.page.getByLabel("Effect 0 is on").uncheck();
+  await choose("B");
+  await add();
+  await stopped();
+  await choose("A");
+  await add();
+  await viewer.page.locator('[data-effect="0"] summary').click();
+  await viewer.page.getByRole("button", { name: "Remove effect 0" }).click();
+  await viewer.until("it goes", async () => (await viewer.page.locator('[data-effect="0"]').count()) === 0);
+  // A mesh that was placed in the workspace of A is not loaded into the scene of B.
+  await viewer.drop({ "triangle.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" });
+  await viewer.until("the preview", () => viewer.page.getByRole("button", { name: "Load into the scene" }).isVisible());
+  await choose("B");
+  assert.equal(await viewer.page.getByRole("button", { name: "Load into the scene" }).count(), 0);
+  assert.match(await viewer.text("#drop-panel"), /another scene: drop the file again/);
+  await viewer.until("the effect of B", () => viewer.page.locator('[data-effect="0"]').isVisible());
+  await end(viewer, server);
+});
+
+test("a server that was started anew gets nothing that was typed for, or switched off in, the one before", async () => {
+  const first = await Server.start(hapticd);
+  const viewer = await opened(first);
+  const client = await first.client();
+  client.send(client.wire.setPlane(0, [0, 1, 0, 0.03], 0.5, 0, 0, 0));
+  await viewer.page.getByLabel("Plane 0 is on").uncheck();
+  await until("no plane", async () => (await first.state()).scenes[0].planes.length === 0);
+  await viewer.page.click("#load-bunny");
+  await viewer.showsTriangles(3674);
+  await viewer.page.locator('[data-object="0"] summary', { hasText: "Placement" }).click();
+  await viewer.page.getByLabel("Position x of object 0").focus();
+  client.close();
+  await first.stop();
+  await viewer.until("the end", () => viewer.ask("viewer.link.state === 'lost'"));
+  const second = await Server.start(hapticd, { http: new URL(first.url).host });
+  await viewer.connected();
+  await viewer.until("nothing of the plane", async () => (await viewer.page.getByLabel("Plane 0 is on").count()) === 0);
+  assert.equal(await viewer.ask("document.activeElement.closest('[data-object]')"), null);
+  await end(viewer, second);
+});
+
+test("the choice of speeds of a replay has the present one", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const choice = (speed) =>
+    viewer.ask(`(() => {
+      viewer.replay.update({ file: "a.haptics", position_s: 1, duration_s: 9, speed: ${speed}, paused: false, ended: false, loop: false, contacts: [], trips: [], markers: [] });
+      return document.querySelector("#replay select").selectedOptions[0]?.text;
+    })()`);
+  assert.equal(await choice(1), "1 ×");
+  assert.equal(await choice(0.2), "0.2 ×");
+  assert.equal(await choice(0.3), "0.3 ×");
+  await end(viewer, server);
+});
+
+test("the picture has a pixel for each of the screen, also after a zoom", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const session = await browser.context.newCDPSession(viewer.page);
+  for (const zoom of [2, 0.5, 1]) {
+    const size = { width: Math.round(1366 / zoom), height: Math.round(768 / zoom) };
+    await session.send("Emulation.setDeviceMetricsOverride", { ...size, deviceScaleFactor: zoom, mobile: false });
+    await viewer.until(`zoom ${zoom}`, () =>
+      viewer.ask(`devicePixelRatio === ${zoom} && Math.abs(viewer.view.canvas.width - ${zoom} * viewer.view.canvas.clientWidth) <= 2`));
+  }
+  await end(viewer, server);
+});
+
+test("in forced colours it is seen which of several is chosen, and colours that are the content stay", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.page.emulateMedia({ forcedColors: "active" });
+  const backgrounds = await viewer.ask(
+    "[...document.querySelectorAll('#drag-is input')].map((i) => getComputedStyle(i.nextElementSibling).backgroundColor)",
+  );
+  assert.equal(new Set(backgrounds).size, 2, `${backgrounds}`);
+  const swatches = await viewer.ask(`(() => {
+    const card = document.createElement("i");
+    card.className = "swatch";
+    card.style.background = "rgb(1, 2, 3)";
+    document.body.append(card);
+    const { backgroundColor } = getComputedStyle(card);
+    card.remove();
+    return backgroundColor;
+  })()`);
+  assert.equal(swatches, "rgb(1, 2, 3)");
+  await end(viewer, server);
+});
+
 test("a page of a replay moves the hand of the live server that follows", async () => {
   const recording = join(folder, "short.haptics");
   const recorded = await Server.start(hapticd, { more: ["--record", recording] });
@@ -372,6 +586,10 @@ test("a page of a replay moves the hand of the live server that follows", async 
   const viewer = await opened(replayed);
   await viewer.until("the replay", () => viewer.page.isVisible("#replay"));
   assert.equal(await viewer.ask("viewer.hand.enabled"), false);
+  assert.equal(await viewer.page.isVisible("#notice"), false, "nothing can be loaded into its empty scene");
+  await viewer.drop({ "triangle.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" });
+  await viewer.until("the reason", async () => (await viewer.text("#toasts")).includes("replays a recording: nothing can be loaded"));
+  assert.equal(await viewer.page.isVisible("#drop-panel"), false);
   await replayed.stop();
   const live = await Server.start(hapticd, { http: new URL(replayed.url).host });
   await viewer.until("live", () => viewer.ask("viewer.link.state === 'open' && viewer.state.server.replay === null && viewer.tick"));

@@ -17,10 +17,9 @@ export interface DropContext {
   view: View;
   device(): DeviceState | undefined;
   scene(): SceneState | undefined;
+  /** The server replays a recording, whose scene is as it was. */
+  replays(): boolean;
 }
-
-/** The server tells a reason for the same refusal once in this time. */
-const REFUSAL_MS = 1000;
 
 export class DropMesh {
   private readonly panel = byId("drop-panel");
@@ -35,8 +34,6 @@ export class DropMesh {
   private uploads: Promise<void> = Promise.resolve();
   /** The mesh that was sent last. */
   private last: { name: string; way: UnderWay } | undefined;
-  /** Why the server refused one; until then it refuses others without a text of their own. */
-  private refusal = { why: "", until_ms: 0 };
   /** The mesh that is being sent; empty: none. */
   sending = "";
 
@@ -73,21 +70,32 @@ export class DropMesh {
     }
   }
 
-  /** The states that follow are of another scene. */
+  /** The connection was lost, or the states that follow are of another scene. */
   clear(): void {
+    const unseen = this.last?.way.isUnderWay() ? this.last.name : "";
     this.targets.clear();
+    if (unseen !== "")
+      this.show(`${unseen}: the connection or the scene changed before it was seen there. Load it again if it is missing.`, "bad");
   }
 
-  /** The server refused the batch of the mesh that was sent last. */
+  /** A mesh that is being placed was placed in the workspace of another device, or in another scene. */
+  endPreview(): void {
+    if (!this.placing?.root.isConnected) return;
+    this.placing.end();
+    this.choose();
+    this.show("This is another scene: drop the file again.", "bad");
+  }
+
+  /** The server refused the batch of the mesh that was sent last, with a text for each kind of message in it. */
   refused(why: string): void {
     if (!this.last?.way.isUnderWay()) return;
     this.last.way.takeBack();
-    this.refusal = { why, until_ms: performance.now() + REFUSAL_MS };
     this.show(`${this.last.name}: ${why}`, "bad");
   }
 
   private async open(files: File[]): Promise<void> {
     if (files.length === 0) return;
+    if (this.context.replays()) return toast("This server replays a recording: nothing can be loaded into its scene.", 1);
     const device = this.context.device();
     this.panel.hidden = false;
     if (!device) return this.show("No device is connected yet: try again in a moment.", "bad");
@@ -168,6 +176,8 @@ export class DropMesh {
   private async send(name: string, mesh: FileMesh, placing: Placing, channel: Channel, device?: string): Promise<void> {
     const scene = this.context.scene();
     const objects = scene?.objects ?? [];
+    const removed = placing.removedTarget(objects);
+    if (removed !== undefined) return this.show(`${name}: object ${removed} was removed. Drop the file again.`, "bad");
     const placement = placing.placement(this.targets.next(objects), scene);
     const way = this.targets.begin(placement.object, name, objects);
     this.last = { name, way };
@@ -177,7 +187,6 @@ export class DropMesh {
     this.show(`Sending ${name} …`);
     try {
       if (this.context.device()?.name !== device) throw new Error("another device was chosen before it could be sent");
-      if (performance.now() < this.refusal.until_ms) throw new Error(this.refusal.why);
       await upload(channel, mesh, placement, (share) => (this.bar.value = share));
       // A small mesh may be in the server's state before its last bytes are known to have left.
       if (way.isUnderWay()) this.show(`${name} is sent; the server is processing it …`, "waiting");
@@ -189,6 +198,7 @@ export class DropMesh {
     }
     this.bar.hidden = true;
     this.sending = "";
+    await channel.read(); // a refusal of this one is none of the next
   }
 
   private show(text: string, level = ""): void {

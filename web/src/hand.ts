@@ -27,6 +27,9 @@ const KEY_MM = 2;
 const REFRESH_MS = 200;
 const LEG_TIMEOUT_MS = 900;
 const IDLE_MS = 60_000;
+/** A finger takes the hand once it has moved this far, or has stayed this long: the second finger of a pinch may follow. */
+const FINGER_PX = 8;
+const FINGER_MS = 150;
 const IDLE_CHECK_MS = 1000;
 
 const REFUSALS: readonly number[] = [REFUSAL.handNotSimulated, REFUSAL.handHeldByOther, REFUSAL.handPoseInvalid];
@@ -44,6 +47,8 @@ export class Hand {
   /** The finger, or the mouse, that drags. */
   private pointerId = -1;
   private ignoredUntilUp = false;
+  /** The finger that may be the first of two, where it touched. */
+  private finger: { id: number; x: number; y: number; since_ms: number } | undefined;
   private press_mm = PRESS_MM;
   private pointer = { x: 0, y: 0 };
   private target = new Vector3();
@@ -69,7 +74,7 @@ export class Hand {
     canvas.addEventListener("pointerdown", (e) => this.down(e), { capture: true });
     canvas.addEventListener("pointermove", (e) => this.move(e));
     canvas.addEventListener("pointerup", (e) => this.up(e));
-    canvas.addEventListener("pointercancel", (e) => this.up(e));
+    canvas.addEventListener("pointercancel", (e) => this.cancel(e));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
     // Not with the frames: a hidden page has none.
@@ -96,12 +101,14 @@ export class Hand {
   onLost(): void {
     this.held = false;
     this.ignoredUntilUp = this.dragging;
+    this.finger = undefined;
     this.route = [];
     this.onChange();
   }
 
   /** Call once per frame: sends the target of the hand. */
   frame(time_ms: number): void {
+    if (this.finger && performance.now() - this.finger.since_ms > FINGER_MS) this.press(this.finger);
     if (!this.held) return;
     this.advance(time_ms);
     if (time_ms - this.sentAt_ms < REFRESH_MS && !this.targetChanged) return;
@@ -112,14 +119,22 @@ export class Hand {
 
   private down(e: PointerEvent): void {
     if (!e.isPrimary) return this.stay(); // two fingers move the camera
-    if (e.button !== 0 || !this.enabled) return;
-    const context = this.context();
-    if (!context) return;
+    if (e.button !== 0 || !this.enabled || !this.context()) return;
     this.view.canvas.setPointerCapture(e.pointerId);
+    const finger = { id: e.pointerId, x: e.clientX, y: e.clientY, since_ms: performance.now() };
+    if (e.pointerType === "touch") this.finger = finger;
+    else this.press(finger);
+  }
+
+  /** The drag begins. */
+  private press({ id, x, y }: { id: number; x: number; y: number }): void {
+    this.finger = undefined;
+    const context = this.context();
+    if (!context || !this.enabled) return;
     this.dragging = true;
-    this.pointerId = e.pointerId;
+    this.pointerId = id;
     this.view.zooming = false;
-    this.pointer = { x: e.clientX, y: e.clientY };
+    this.pointer = { x, y };
     if (!this.held) this.take(context);
     this.aim();
     this.route = this.routeToTarget(context);
@@ -135,12 +150,20 @@ export class Hand {
   }
 
   private move(e: PointerEvent): void {
+    const { finger } = this;
+    if (finger?.id === e.pointerId && Math.hypot(e.clientX - finger.x, e.clientY - finger.y) > FINGER_PX) this.press(finger);
     if (!this.dragging || !this.held || e.pointerId !== this.pointerId) return;
     this.pointer = { x: e.clientX, y: e.clientY };
     this.aimPending = true;
   }
 
   private up(e: PointerEvent): void {
+    if (this.finger?.id === e.pointerId) this.press(this.finger); // a tap
+    if (e.pointerId === this.pointerId) this.stay();
+  }
+
+  private cancel(e: PointerEvent): void {
+    if (this.finger?.id === e.pointerId) this.finger = undefined;
     if (e.pointerId === this.pointerId) this.stay();
   }
 
@@ -148,6 +171,7 @@ export class Hand {
   private stay(): void {
     if (this.held && this.aimPending) this.aim(); // before the camera moves
     this.dragging = this.ignoredUntilUp = false;
+    this.finger = undefined;
     this.view.zooming = true;
   }
 

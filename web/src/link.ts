@@ -13,8 +13,12 @@ const MOST_UNANSWERED = 20;
 /** Bytes that may wait on their way before a stop takes another one: 0.1 s at 5 Mbit/s. */
 const MOST_BACKLOG = 65_536;
 const BESIDE_MS = 10_000;
+const READ_EVERY_MS = 10;
 const RETRY_FIRST_MS = 500;
 const RETRY_MAX_MS = 4000;
+
+/** Of times on the wire and of the browser's clock, seconds. */
+const ROUNDING_S = 0.001;
 
 /** The wall clock of this machine in seconds; it never jumps. */
 const wall_s = (): number => (performance.timeOrigin + performance.now()) / 1000;
@@ -37,7 +41,10 @@ class ServerClock {
     const now_s = wall_s();
     const roundTrip_s = now_s - this.sent_s;
     this.best_s *= 1.05; // clocks drift: an old estimate expires
-    if (roundTrip_s <= this.best_s) {
+    // Outside the time of this ping only when a clock was set.
+    const before_s = this.ahead_s;
+    const wasSet = before_s < server_s - now_s - ROUNDING_S || before_s > server_s - this.sent_s + ROUNDING_S;
+    if (roundTrip_s <= this.best_s || wasSet) {
       this.best_s = roundTrip_s;
       this.ahead_s = server_s - (now_s + this.sent_s) / 2;
     }
@@ -56,6 +63,8 @@ export interface Channel {
   readonly open: boolean;
   /** Bytes queued in the browser. */
   readonly waiting: number;
+  /** Resolves once the server has read what was sent until now, and its texts about it have come; or once the connection has ended. */
+  read(): Promise<void>;
 }
 
 function newSocket(): WebSocket {
@@ -179,6 +188,13 @@ export class Link {
       get waiting() {
         return socket?.bufferedAmount ?? 0;
       },
+      async read() {
+        const { sent } = link;
+        while (this.open && link.sentAtPong < sent) {
+          if (!link.clock.waits) link.ping();
+          await new Promise((resolve) => setTimeout(resolve, READ_EVERY_MS));
+        }
+      },
     };
   }
 
@@ -218,22 +234,23 @@ export class Link {
     this.retry_ms = RETRY_FIRST_MS;
     for (const message of this.greeting()) this.peer?.send(this.device, message);
     this.setState("open");
-    const sendPing = (): void => {
-      this.unansweredTicks = 0;
-      this.clock.sent();
-      this.send(ping());
-      this.sentAtPing = this.sent;
-    };
     this.silentTicks = 0;
-    sendPing();
+    this.ping();
     this.pingTimer = window.setInterval(() => {
-      if (!this.clock.waits) return sendPing();
+      if (!this.clock.waits) return this.ping();
       ++this.silentTicks;
       ++this.unansweredTicks;
       // A network may drop a connection without an end, for example behind a NAT or a VPN.
       if (this.silentTicks >= MOST_SILENT || this.unansweredTicks >= MOST_UNANSWERED)
         this.end(peer, "the server does not answer");
     }, PING_EVERY_MS);
+  }
+
+  private ping(): void {
+    this.unansweredTicks = 0;
+    this.clock.sent();
+    this.send(ping());
+    this.sentAtPing = this.sent;
   }
 
   private lost(peer: Endpoint): void {

@@ -33,6 +33,7 @@ export class LivePlots {
   private meanSince: Tick | undefined;
   private periodAt_s = -Infinity;
   private turn = 0;
+  private paused = false;
   private readonly marks: Mark[] = [];
   /** Of the newest tick; those of the first one began before. */
   private trips: number | undefined;
@@ -136,6 +137,7 @@ export class LivePlots {
     pause.addEventListener("click", () => {
       const on = pause.ariaPressed !== "true";
       pause.ariaPressed = String(on);
+      this.paused = on;
       for (const plot of this.timed) plot.paused = on;
     });
     byId("plots-csv").addEventListener("click", () => save(new Blob([this.csv()], { type: "text/csv" }), "csv"));
@@ -151,7 +153,7 @@ export class LivePlots {
     const latency = this.latency.data()[1]!;
     const rows = Array.from(time!, (t, i) => `${t.toFixed(6)},${force![i]!},${depth[i]!},${latency[i]!}`);
     const marks = this.marks
-      .filter((m) => m.time_s >= (time![0] ?? Infinity))
+      .filter((m) => m.time_s >= (time![0] ?? Infinity) && (!this.paused || m.time_s <= time!.at(-1)!))
       .map((m) => `# ${m.time_s.toFixed(6)} ${m.label.replaceAll(/[\r\n]/g, " ")}`);
     return [...marks, "time_s,force_N,depth_mm,latency_ms", ...rows].join("\n") + "\n";
   }

@@ -20,7 +20,7 @@ import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
 import { REFUSAL, TRIPS } from "./server_tables";
 import { pollServers } from "./servers";
-import { Meshes, pollState } from "./state";
+import { Meshes, pollState, Starts } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
 import { effectNames, feltForces, nameOfObject, type RemoteContact } from "./sources";
 import { startTheme } from "./theme";
@@ -29,6 +29,8 @@ import * as wire from "./wire";
 
 const REPORTS_HZ = 125;
 const READOUT_MS = 80;
+/** For which a server may leave the button of the recording without an effect. */
+const RECORD_MS = 5000;
 
 class Page {
   private state: ServerState | undefined;
@@ -39,10 +41,13 @@ class Page {
   private remote: RemoteContact[] = [];
   private marked = 0;
   private recording = false;
+  /** A recording is being begun or ended until then. */
+  private recordAgainAt_ms = 0;
   /** When each trip acted last. */
   private readonly tripAt_ms = new Map<string, number>();
   private tickIsNew = false;
   private readoutAt_ms = 0;
+  private readonly starts = new Starts();
   private serverResponds = true;
   /** A stop was sent, and the server has not reported it yet. */
   private stopUnconfirmed = false;
@@ -81,6 +86,7 @@ class Page {
     view: this.view,
     device: () => this.device,
     scene: () => this.scene,
+    replays: () => !!this.state?.server.replay,
   });
   private readonly guard = new GuardPanel(byId("guard"));
   private readonly clients = new ClientsPanel(byId("clients"));
@@ -124,7 +130,7 @@ class Page {
       this.view.sources.arrows = (e.target as HTMLInputElement).checked;
       this.tickIsNew = true;
     });
-    byId("record").addEventListener("click", () => this.send(wire.recordingControl(!this.recording)));
+    byId("record").addEventListener("click", (e) => this.record(e));
     byId("mark").addEventListener("submit", (e) => {
       e.preventDefault();
       this.mark();
@@ -147,6 +153,13 @@ class Page {
   private mark(): void {
     const input = byId<HTMLInputElement>("mark-text");
     this.send(wire.mark(input.value.trim() || `mark ${++this.marked}`));
+  }
+
+  /** Begins or ends the recording; not again with the second click of two, nor before the server has done it. */
+  private record(e: MouseEvent): void {
+    if (e.detail > 1 || performance.now() < this.recordAgainAt_ms) return;
+    if (this.link.send(wire.recordingControl(!this.recording))) this.recordAgainAt_ms = performance.now() + RECORD_MS;
+    else toast("Not connected: the command was not sent.", 2);
   }
 
   private stop(): void {
@@ -202,6 +215,7 @@ class Page {
     this.showLink();
     if (!state && this.state) this.clearReadout();
     if (state) {
+      if (this.starts.isAnother(state.server.uptime_s)) this.forgetScene();
       this.state = state;
       this.showDevices(state.devices);
       const device = state.devices.find((d) => d.name === this.deviceChoice.value) ?? state.devices[0];
@@ -233,8 +247,10 @@ class Page {
     // In a replay there is no hand to move; the choice stands for the live server that follows.
     const drag = server.replay ? "camera" : document.querySelector<HTMLInputElement>("#drag-is input:checked")!.value;
     if (drag !== this.drag) this.chooseDrag(drag);
-    this.recording = server.recording !== null;
-    byId("record").setAttribute("aria-pressed", String(this.recording));
+    const recording = server.recording !== null;
+    if (recording !== this.recording) this.recordAgainAt_ms = 0;
+    this.recording = recording;
+    byId("record").classList.toggle("on", recording);
     setText(byId("record"), this.recording ? "End recording" : "Record");
     byId("recording").hidden = !this.recording;
     setText(byId("recording"), `● ${server.recording ?? ""}`);
@@ -279,9 +295,7 @@ class Page {
   private chooseDevice(name: string): void {
     this.hand.letGo();
     this.link.use(name);
-    this.meshes.clear();
-    this.drop.clear();
-    this.sourcesPanel.clear();
+    this.forgetScene();
     this.plots.clear();
     this.tripAt_ms.clear();
     this.contacts = [];
@@ -295,6 +309,16 @@ class Page {
     if (this.device && this.state) this.show(this.device, this.state);
   }
 
+  /** The scene that follows is another one. */
+  private forgetScene(): void {
+    this.meshes.clear();
+    this.drop.clear();
+    this.drop.endPreview();
+    this.objectsPanel.clear();
+    this.effects.clear();
+    this.sourcesPanel.clear();
+  }
+
   private showNotice(): void {
     const noDevice = this.state?.devices.length === 0;
     if (this.link.state === "lost" || (!this.serverResponds && this.state)) return showNotice("lost");
@@ -304,6 +328,7 @@ class Page {
     const loading = !byId("drop-panel").hidden; // its picture is under the notice
     showNotice(
       loading ||
+        this.state?.server.replay || // an empty scene stays so
         this.objects().some((o) => o.triangles > 0) || (this.scene?.planes.length ?? 0) > 0 ? "" : "empty",
     );
   }
@@ -316,6 +341,7 @@ class Page {
     this.showLink();
     if (state === "open") this.subscribe();
     if (state === "lost") {
+      this.recordAgainAt_ms = 0;
       if (this.stopUnconfirmed) this.warnOfStop();
       this.stopUnconfirmed = false;
       this.hand.onLost();
@@ -392,11 +418,9 @@ class Page {
 
   private onText({ severity, level, text }: wire.ServerText): void {
     if (refusesHand(level, text)) this.hand.onLost();
-    if (level === REFUSAL.notPermitted) {
-      // One text says why, and one for each kind of message that follows from it.
-      if (text.endsWith("it belongs to a batch that was refused")) return;
-      if (text.includes("Batch_Begin refused: ")) this.drop.refused(text);
-    }
+    // The text about its begin said why.
+    if (severity === 2) this.recordAgainAt_ms = 0; // it may be the answer
+    if (level === REFUSAL.batchRefused) return this.drop.refused(text);
     toast(text, severity);
   }
 

@@ -126,4 +126,5 @@ export const REFUSAL = {
   streamInvalid: 6,
   stoppedByOther: 7,
   tokenRefused: 8,
+  batchRefused: 9,
 } as const;

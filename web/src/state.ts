@@ -6,6 +6,8 @@ const EVERY_MS = 250;
 const EVERY_DEFORMING_MS = 60;
 /** Without a server: each failed request is a line in the browser's console. */
 const EVERY_LOST_MS = 2000;
+/** Without a further byte of a state. */
+const SILENT_MS = 3000;
 const RETRY_MS = 1000;
 /** Limit of the server for the display meshes of a scene together. */
 const MAX_DISPLAY_TRIANGLES = 100_000;
@@ -29,6 +31,52 @@ export function decodeMesh(bytes: ArrayBuffer): DisplayMesh {
   };
 }
 
+/** Rounding of an uptime, and the way of a state. */
+const START_TOLERANCE_S = 5;
+
+/** Tells a server from the one before it at this address, which had another scene. */
+export class Starts {
+  private uptime_s = -Infinity;
+  /** When it started, on two clocks of this machine: one may be set, the other stands still while the machine sleeps. */
+  private start_s: [number, number] = [Infinity, Infinity];
+
+  isAnother(uptime_s: number): boolean {
+    const start_s: [number, number] = [Date.now() / 1000 - uptime_s, performance.now() / 1000 - uptime_s];
+    const isLater = start_s.every((s, i) => s > this.start_s[i]! + START_TOLERANCE_S);
+    const isAnother = uptime_s < this.uptime_s || isLater;
+    this.uptime_s = uptime_s;
+    this.start_s = start_s;
+    return isAnother;
+  }
+}
+
+/** The state, or undefined. On a slow network that of many objects takes seconds: it is given up when nothing more of it comes. */
+async function fetchState(): Promise<ServerState | undefined> {
+  const request = new AbortController();
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const goesOn = (): void => {
+    clearTimeout(timer);
+    timer = setTimeout(() => request.abort(), SILENT_MS);
+  };
+  try {
+    goesOn();
+    const response = await fetch("/api/state", { signal: request.signal });
+    if (!response.ok || !response.body) return undefined;
+    const decoder = new TextDecoder();
+    let text = "";
+    const reader = response.body.getReader();
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+      goesOn();
+      text += decoder.decode(part.value, { stream: true });
+    }
+    return JSON.parse(text + decoder.decode()) as ServerState;
+  } catch {
+    return undefined; // the server does not respond
+  } finally {
+    clearTimeout(timer);
+  }
+}
+
 /** Calls back with each new state; `undefined` when the server does not respond. The next one comes soon once `deforms` is true. */
 export function pollState(onState: (state: ServerState | undefined) => void, deforms: () => boolean): void {
   const next = (wait_ms: number): void => {
@@ -36,26 +84,29 @@ export function pollState(onState: (state: ServerState | undefined) => void, def
     window.setTimeout(() => void (wait_ms === step_ms || deforms() ? poll() : next(wait_ms - step_ms)), step_ms);
   };
   const poll = async (): Promise<void> => {
-    let state: ServerState | undefined;
-    try {
-      const response = await fetch("/api/state", { signal: AbortSignal.timeout(3000) });
-      if (response.ok) state = (await response.json()) as ServerState;
-    } catch {
-      // The server does not respond: undefined.
-    }
+    const from_ms = performance.now();
+    const state = await fetchState();
+    // A slow network has room for the reports, too.
+    const took_ms = performance.now() - from_ms;
     try {
       onState(state);
     } finally {
-      if (state) next(EVERY_MS);
+      if (state) next(Math.max(EVERY_MS, took_ms));
       else window.setTimeout(() => void poll(), EVERY_LOST_MS);
     }
   };
   void poll();
 }
 
+/** What is known of a mesh that the page shows. */
+interface Shown {
+  geometry: number;
+  detailLevel: number;
+}
+
 /** The display meshes of one scene: fetches them one after the other when their shape has changed. */
 export class Meshes {
-  private readonly have = new Map<number, string>();
+  private readonly have = new Map<number, Shown>();
   private request: AbortController | undefined;
   private notBefore_ms = 0;
   private scene = 0;
@@ -85,7 +136,7 @@ export class Meshes {
   update(scene: number, objects: ObjectState[]): void {
     this.scene = scene;
     this.objects = objects;
-    this.changed = objects.some((o) => (this.have.get(o.id) ?? keyOf(o, 0)).split("/")[0] !== String(o.geometry));
+    this.changed = objects.some((o) => (this.have.get(o.id) ?? o).geometry !== o.geometry);
     const withMesh = new Set(objects.filter((o) => o.triangles > 0).map((o) => o.id));
     for (const id of [...this.have.keys()]) {
       if (withMesh.has(id)) continue;
@@ -97,7 +148,11 @@ export class Meshes {
 
   private next(): void {
     const detailLevel = detailLevelOf(this.objects);
-    const missing = this.objects.find((o) => o.triangles > 0 && this.have.get(o.id) !== keyOf(o, detailLevel));
+    const isShown = ({ id, geometry }: ObjectState): boolean => {
+      const shown = this.have.get(id);
+      return shown?.geometry === geometry && shown.detailLevel === detailLevel;
+    };
+    const missing = this.objects.find((o) => o.triangles > 0 && !isShown(o));
     if (missing && !this.request && performance.now() > this.notBefore_ms)
       void this.fetch(this.scene, missing, detailLevel);
   }
@@ -116,7 +171,7 @@ export class Meshes {
       }
       const mesh = decodeMesh(await response.arrayBuffer());
       if (signal.aborted) return;
-      this.have.set(object.id, keyOf(object, detailLevel));
+      this.have.set(object.id, { geometry: object.geometry, detailLevel });
       this.onMesh(object.id, mesh);
       arrived = true;
     } catch {
@@ -134,5 +189,3 @@ function detailLevelOf(objects: ObjectState[]): number {
   const all = objects.reduce((sum, o) => sum + o.triangles, 0);
   return Math.max(0, Math.round(Math.log(all / MAX_DISPLAY_TRIANGLES) / Math.log(1.5)));
 }
-
-const keyOf = (o: ObjectState, detailLevel: number): string => `${o.geometry}/${detailLevel}`;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/config/config.h"
@@ -46,9 +47,14 @@ class SceneHost {
   /// Whether the open batch of the client was admitted when it began; none: it has no open batch.
   std::optional<bool> batchOf(scene::ClientId client) const {
     const auto open = batches_.find(client);
-    return open == batches_.end() ? std::nullopt : std::optional(open->second);
+    return open == batches_.end() ? std::nullopt : std::optional(!open->second.has_value());
   }
-  void beginBatch(scene::ClientId client, bool admitted) { batches_.try_emplace(client, admitted); }
+  /// Why the open batch of the client was refused when it began.
+  const std::string& refusalOfBatch(scene::ClientId client) const { return batches_.at(client).value(); }
+  /// Without a refusal, it is admitted.
+  void beginBatch(scene::ClientId client, std::optional<std::string> refusal) {
+    batches_.try_emplace(client, std::move(refusal));
+  }
   void endBatch(scene::ClientId client) { batches_.erase(client); }
   /// Queues the commands that take() kept; all of them are from this client.
   void flush(scene::ClientId client);
@@ -102,7 +108,8 @@ class SceneHost {
   CommandDecoder decoder_;
   const std::shared_ptr<scene::ForceOwners> owners_ = std::make_shared<scene::ForceOwners>();
   std::set<scene::ClientId> commandingClients_;  // connected clients that have commanded the scene
-  std::map<scene::ClientId, bool> batches_;      // whether it was admitted; the builder has its content
+  // Why it was refused, if it was; the builder has its content.
+  std::map<scene::ClientId, std::optional<std::string>> batches_;
 };
 
 }  // namespace hapticd::server

@@ -21,6 +21,7 @@ enum class RefusalCode : std::uint32_t {
   streamInvalid = 6,     ///< Remote_Contacts, Held_Force: a number is not usable
   stoppedByOther = 7,    ///< Rearm_Forces: a stop of another client stands, and only certain ones may undo it
   tokenRefused = 8,      ///< Identify: no such token, or too many wrong ones from this address
+  batchRefused = 9,      ///< a command of a batch whose Batch_Begin was refused
 };
 
 /// The refusal of one command.
@@ -35,7 +36,7 @@ struct RefusalInfo {
 };
 
 /// All codes, in order.
-inline constexpr std::array<RefusalInfo, 9> kRefusals{{
+inline constexpr std::array<RefusalInfo, 10> kRefusals{{
     {RefusalCode::none, "none"},
     {RefusalCode::notPermitted, "notPermitted"},
     {RefusalCode::handNotSimulated, "handNotSimulated"},
@@ -45,6 +46,7 @@ inline constexpr std::array<RefusalInfo, 9> kRefusals{{
     {RefusalCode::streamInvalid, "streamInvalid"},
     {RefusalCode::stoppedByOther, "stoppedByOther"},
     {RefusalCode::tokenRefused, "tokenRefused"},
+    {RefusalCode::batchRefused, "batchRefused"},
 }};
 
 }  // namespace hapticd::server

@@ -75,6 +75,8 @@ class Session {
   scene::ClientId id() const noexcept { return id_; }
   /// "127.0.0.1:40312, tcp" for logs.
   const std::string& description() const noexcept { return description_; }
+  /// It speaks VRPN.
+  bool greeted() const noexcept { return greeted_; }
   bool connected() const noexcept { return peer_.connected(); }
 
   /// Whether the client wants reports under this name: it described the name, or none of the server's names

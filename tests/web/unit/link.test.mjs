@@ -190,6 +190,33 @@ test("the server's clock is estimated from a ping and its own answer, however la
   for (const age of ages.slice(1)) assert.ok(Math.abs(age - 0.8) < 0.01, `${ages}`);
 });
 
+test("a clock of the server that is set is followed at the next answer, also on a network that has become slower", (t) => {
+  t.mock.timers.enable({ apis: ["setInterval"] });
+  let now_ms = 0;
+  t.mock.method(performance, "now", () => now_ms);
+  const ages = [];
+  const link = new Link(() => undefined, (_, age_s) => ages.push(age_s));
+  link.connect("Arm");
+  const [socket] = Socket.all;
+  socket.accept();
+  let set_s = 0;
+  let roundTrip_ms = 2;
+  const server = new Endpoint((bytes) => socket.answers.push(Uint8Array.from(bytes).buffer), () => undefined, () =>
+    performance.timeOrigin / 1000 + (now_ms - roundTrip_ms / 2) / 1000 + set_s);
+  server.open();
+  socket.answers.length = 0; // its cookie
+  const answer = () => {
+    now_ms += roundTrip_ms;
+    server.send("Arm", { name: "vrpn_Base pong_message", payload: new Uint8Array(0) });
+    socket.answer();
+    t.mock.timers.tick(1000); // the next ping
+    return ages.at(-1);
+  };
+  for (let i = 0; i < 3; ++i) assert.ok(Math.abs(answer() - 0.001) < 2e-4, `${ages}`);
+  roundTrip_ms = 60;
+  for (set_s of [3600, -3600, 0.5]) assert.ok(Math.abs(answer() - 0.03) < 2e-3, `${set_s}: ${ages}`);
+});
+
 test("a connection without an answer is lost after 3 s, and a new one is made", (t) => {
   t.mock.method(console, "warn", () => undefined);
   t.mock.timers.enable({ apis: ["setInterval", "setTimeout"] });

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bundled } from "../bundled.mjs";
 
-const { Meshes, pollState } = await bundled("state.ts");
+const { Meshes, pollState, Starts } = await bundled("state.ts");
 
 /** A triangle as GET /api/mesh gives it. */
 function answer() {
@@ -76,7 +76,7 @@ test("states come four times a second, and four times as often while meshes defo
   let works = true;
   let deforms = false;
   let states = 0;
-  globalThis.fetch = async () => ({ ok: works, json: async () => ({}) });
+  globalThis.fetch = async () => new Response("{}", { status: works ? 200 : 500 });
   /** Times between this state and the next one. */
   const waits = async () => {
     const all = [];
@@ -96,4 +96,72 @@ test("states come four times a second, and four times as often while meshes defo
   assert.equal(await waits(), 60);
   assert.equal(await waits(), 2000, "of a server that does not answer no shape is known");
   globalThis.window = before;
+});
+
+test("a state that takes long is waited for while it comes, and given up when it does not", async () => {
+  const before = [globalThis.window, globalThis.setTimeout, globalThis.clearTimeout];
+  const timers = new Map();
+  const later = [];
+  globalThis.window = { setTimeout: (call, ms) => later.push([call, ms]) };
+  globalThis.setTimeout = (call, ms) => {
+    timers.set(call, ms);
+    return call;
+  };
+  globalThis.clearTimeout = (call) => timers.delete(call);
+  let parts;
+  let signal;
+  globalThis.fetch = async (_, options) => {
+    ({ signal } = options);
+    const stream = new TransformStream();
+    parts = stream.writable.getWriter();
+    signal.addEventListener("abort", () => parts.abort(signal.reason).catch(() => undefined));
+    return new Response(stream.readable);
+  };
+  const states = [];
+  const soon = () => new Promise((resolve) => before[1](resolve, 5));
+  pollState((state) => states.push(state), () => false);
+  await soon();
+  for (const part of ['{"server":', ' {"version": "', "é", '"}}']) {
+    assert.deepEqual([...timers.values()], [3000]);
+    await parts.write(new TextEncoder().encode(part));
+    await soon();
+  }
+  await parts.close();
+  await soon();
+  assert.deepEqual(states, [{ server: { version: "é" } }]);
+  assert.equal(timers.size, 0);
+  for (const [call] of later.splice(0)) call(); // a step of the wait
+  while (states.length === 1 && signal.aborted === false && timers.size === 0) for (const [call] of later.splice(0)) call();
+  await soon();
+  await parts.write(new TextEncoder().encode("{"));
+  await soon();
+  for (const call of [...timers.keys()]) call(); // nothing more comes
+  await soon();
+  assert.deepEqual(states.slice(1), [undefined]);
+  [globalThis.window, globalThis.setTimeout, globalThis.clearTimeout] = before;
+});
+
+test("a server that was started anew is another one, and one whose clock or ours was set is not", () => {
+  const before = [Date.now, performance.now];
+  let [date, monotonic] = [1e12, 5000];
+  Date.now = () => date;
+  performance.now = () => monotonic;
+  const passes = (ms) => ((date += ms), (monotonic += ms));
+  const starts = new Starts();
+  assert.equal(starts.isAnother(100), false, "the first");
+  passes(1000);
+  assert.equal(starts.isAnother(101.2), false);
+  date += 3600e3; // the clock was set
+  assert.equal(starts.isAnother(101.4), false);
+  date -= 7200e3;
+  assert.equal(starts.isAnother(101.4), false);
+  date += 600e3; // this machine slept
+  assert.equal(starts.isAnother(701.4), false);
+  passes(1000);
+  assert.equal(starts.isAnother(3), true);
+  passes(1000);
+  assert.equal(starts.isAnother(4), false);
+  passes(3600e3);
+  assert.equal(starts.isAnother(1800), true, "the other one had run for longer than the first before it was seen");
+  [Date.now, performance.now] = before;
 });

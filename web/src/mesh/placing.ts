@@ -104,6 +104,13 @@ export class Placing {
     };
   }
 
+  /** The object that it should replace, if that is there no more. */
+  removedTarget(objects: ObjectState[]): number | undefined {
+    if (this.target.value === NEW_OBJECT) return undefined;
+    const id = Number(this.target.value);
+    return objects.some((o) => o.id === id) ? undefined : id;
+  }
+
   end(): void {
     this.view.remove(this.preview);
     this.preview.geometry.dispose();
@@ -147,9 +154,10 @@ function fit(device: DeviceState, extents: Vector3): { centre: Vector3; scale: n
     .clone()
     .sub(min)
     .multiplyScalar(FILL * T.getMaxScaleOnAxis());
-  const scale = Math.min(
-    ...([0, 1, 2] as const).map((i) => available.getComponent(i) / Math.max(extents.getComponent(i), 1e-12)),
-  );
+  // The mesh stands upright in the world, in which the workspace may be turned.
+  const axes = new Matrix4().extractRotation(T).elements;
+  const along = (i: number): number => [0, 1, 2].reduce((sum, k) => sum + Math.abs(axes[4 * i + k]!) * extents.getComponent(k), 0);
+  const scale = Math.min(...[0, 1, 2].map((i) => available.getComponent(i) / Math.max(along(i), 1e-12)));
   return { centre: min.add(max).multiplyScalar(0.5).applyMatrix4(T), scale };
 }
 

@@ -177,6 +177,14 @@ export class EffectsPanel {
     parent.append(this.list, el("div", { className: "row adder" }, type, add));
   }
 
+  /** Another scene: nothing of this one is remembered. */
+  clear(): void {
+    this.rows.update([]);
+    this.removed.clear();
+    this.added.clear();
+    this.used = [];
+  }
+
   update(effects: EffectState[], unit: VibrationUnit): void {
     this.unit = unit;
     for (const e of effects) if (e.active && !this.used.includes(e.index)) this.removed.delete(e.index);

@@ -82,6 +82,11 @@ export class ObjectsPanel {
     parent.append(this.list, this.more);
   }
 
+  /** Another scene: what is being typed is about none of its objects. */
+  clear(): void {
+    this.rows.update([]);
+  }
+
   update(scene: SceneState | undefined, touched: number): void {
     this.rows.update(scene ? scene.objects.map((o) => ({ o, scene })) : []);
     const left = (scene?.objects.length ?? 0) - MOST_ROWS;

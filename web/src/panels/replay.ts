@@ -50,6 +50,7 @@ export class ReplayBar {
     const s = this.state;
     if (!s) return;
     this.send(s.ended ? replayControl(false, 0, 0) : replayControl(!s.paused));
+    this.state = { ...s, paused: !s.ended && !s.paused, ended: false }; // for what follows before the next state
   }
 
   private seek(): void {
@@ -59,7 +60,7 @@ export class ReplayBar {
 
   private showSpeed(speed: number): void {
     const all = SPEEDS.includes(speed) ? SPEEDS : [...SPEEDS, speed].sort((a, b) => a - b);
-    if (this.speed.options.length !== all.length)
+    if ([...this.speed.options].map((o) => o.value).join() !== all.join())
       this.speed.replaceChildren(...all.map((s) => new Option(`${Number(s.toPrecision(3))} ×`, String(s))));
     if (document.activeElement !== this.speed) this.speed.value = String(speed);
   }

@@ -75,7 +75,6 @@ export class View {
     try {
       this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, preserveDrawingBuffer: this.software });
       this.still = new Still(this.renderer, this.software ? 0 : 4);
-      this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
     } catch (error) {
       console.warn(`no picture: ${String(error)}`);
     }
@@ -298,7 +297,11 @@ export class View {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
     if (width === 0 || height === 0) return;
-    if (this.hasPicture) this.renderer.setSize(width, height, false);
+    if (this.hasPicture) {
+      // The zoom of the browser changes it, too.
+      this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, MOST_PIXELS_PER_POINT));
+      this.renderer.setSize(width, height, false);
+    }
     this.at = this.canvas.getBoundingClientRect();
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
