@@ -63,8 +63,8 @@ class Test {
   bool isSpent() const noexcept { return budget_.visits <= 0; }
 
   bool enclosedAlong(int ray) noexcept {
-    budget_.visits -= EnclosureBudget::kRayVisits;
     if (isSpent()) return true;
+    budget_.visits -= EnclosureBudget::kRayVisits;
     const Vec3 d = reach_ * rayAlong(ray);
     int sum = 0;
     mesh_.indexAt(now_).visitSegment(p_, p_ + d, [&](std::uint32_t triangle) noexcept {

@@ -177,6 +177,29 @@ TEST(WorkOfABall, ends_in_a_bowl_that_is_too_fine) {
   EXPECT_GT(spent, 50);
 }
 
+// A ray through the tree of a body takes time whatever it meets, and counts as well. Bodies beyond the work of
+// a tick count as around the hand until it has left them.
+TEST(WorkOfABall, is_little_within_many_bodies_that_appeared_at_once) {
+  constexpr int kRays = 64;
+  constexpr int kMost = 8192;
+  for (const double radius_m : {0.0, 0.001}) {
+    for (const int bodies : {5, 50}) {
+      SceneFixture scene;
+      for (int i = 0; i < bodies; ++i) scene.add(sphere(0.01 + 2e-4 * i, 12), surface(1000));
+      Ball ball(scene, radius_m);
+      EXPECT_EQ(ball.at({0, 0, 0.001}), 0);
+      EXPECT_NE(ball.status() & kRenderEnclosed, 0U);
+      EXPECT_GE(ball.enclosureVisits(), std::min(kMost, 8 * kRays * bodies)) << bodies;
+      EXPECT_LE(ball.enclosureVisits(), kMost + 16) << bodies;
+      for (int i = 0; i < 100; ++i) ball.at({0, 0, 0.04});
+      EXPECT_EQ(ball.status() & kRenderEnclosed, 0U) << bodies;
+      double felt = 0;
+      for (int i = 0; i < 300; ++i) felt = ball.at({0, 0, 0.04 - 1e-4 * i});
+      EXPECT_GT(felt, 0.5) << bodies;
+    }
+  }
+}
+
 // What appears around the hand and has too many triangles to tell when the hand has left it takes the time of
 // few ticks only, and is felt soon after.
 TEST(WorkOfABall, is_little_within_what_appeared_and_has_too_many_triangles) {
