@@ -177,8 +177,8 @@ TEST(WorkOfABall, ends_in_a_bowl_that_is_too_fine) {
   EXPECT_GT(spent, 50);
 }
 
-// A ray through the tree of a body takes time whatever it meets, and counts as well. Bodies beyond the work of
-// a tick count as around the hand until it has left them.
+// A ray through the tree of a body takes time whatever it meets, and counts as well. Bodies beyond the work
+// of a tick count as around the hand until it has left them.
 TEST(WorkOfABall, is_little_within_many_bodies_that_appeared_at_once) {
   constexpr int kRays = 64;
   constexpr int kMost = 8192;
