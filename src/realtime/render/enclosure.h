@@ -10,7 +10,7 @@ namespace hapticd::realtime {
 /// test exceeds it counts as enclosing, which exerts no force.
 struct EnclosureBudget {
   static constexpr int kRayVisits = 8;  ///< the way of a ray through a tree takes as long
-  int visits = 8192;
+  int visits = 16384;
 };
 
 /// True when the tool at p (device metres) is inside a closed surface of the object, or its ball intersects

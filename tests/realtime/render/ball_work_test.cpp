@@ -181,7 +181,7 @@ TEST(WorkOfABall, ends_in_a_bowl_that_is_too_fine) {
 // of a tick count as around the hand until it has left them.
 TEST(WorkOfABall, is_little_within_many_bodies_that_appeared_at_once) {
   constexpr int kRays = 64;
-  constexpr int kMost = 8192;
+  constexpr int kMost = 16384;
   for (const double radius_m : {0.0, 0.001}) {
     for (const int bodies : {5, 50}) {
       SceneFixture scene;
