@@ -9,7 +9,7 @@ namespace hapticd::realtime {
 /// Visits to triangles that the tests of one tick may make; a ray counts as kRayVisits more. An object whose
 /// test exceeds it counts as enclosing, which exerts no force.
 struct EnclosureBudget {
-  static constexpr int kRayVisits = 8;  ///< the way of a ray through a tree takes as long
+  static constexpr int kRayVisits = 16;  ///< the way of a ray through a tree takes as long
   int visits = 16384;
 };
 

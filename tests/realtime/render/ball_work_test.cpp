@@ -189,7 +189,7 @@ TEST(WorkOfABall, is_little_within_many_bodies_that_appeared_at_once) {
       Ball ball(scene, radius_m);
       EXPECT_EQ(ball.at({0, 0, 0.001}), 0);
       EXPECT_NE(ball.status() & kRenderEnclosed, 0U);
-      EXPECT_GE(ball.enclosureVisits(), std::min(kMost, 8 * kRays * bodies)) << bodies;
+      EXPECT_GE(ball.enclosureVisits(), std::min(kMost, 16 * kRays * bodies)) << bodies;
       EXPECT_LE(ball.enclosureVisits(), kMost + 16) << bodies;
       for (int i = 0; i < 100; ++i) ball.at({0, 0, 0.04});
       EXPECT_EQ(ball.status() & kRenderEnclosed, 0U) << bodies;
