@@ -652,6 +652,14 @@ TEST_F(Forces, PlanesAreInWorldUnitsWithStockSurfaces) {
   publish();
   EXPECT_EQ(scene_->planes[0].placement, p.placement) << "another surface, the same place";
   EXPECT_EQ(scene_->planes[0].recovery, p.recovery) << "it rises as it began to";
+  int copies = 0;
+  for (const ClientCommand& c : builder_.commands(now_)) {
+    if (const auto* const plane = std::get_if<SetPlane>(&c.command)) {
+      ++copies;
+      EXPECT_EQ(plane->recoveryCycles, 10) << "also in a recording that begins now";
+    }
+  }
+  EXPECT_EQ(copies, 1);
   say(SetPlane{.index = 0, .plane = {0, 2, 0, 0.03}, .stiffness = 0.5});
   publish();
   EXPECT_NE(scene_->planes[0].placement, p.placement);
