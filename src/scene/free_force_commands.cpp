@@ -126,14 +126,16 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   }
   const Effect effect = effectFrom(*kind, c, config_, bound_, call);
   if (known != effects_.end() && known->second.value.effect.releasing) {
+    const Owned<RunningEffect>& leaving = known->second;
     leavingEffects_.push_back(
-        {known->second.owner, known->second.value.effect, known->second.goneAt, known->second.outOfWorld});
+        {leaving.owner, leaving.value.effect, leaving.goneAt, leaving.outOfWorld, leaving.untoldSince});
     effects_.erase(known);
   }
   Owned<RunningEffect>& entry = effects_[c.index];
   // One that has ended waits for the clock of the servo to end it, too: another duration would go on with it.
   const Nanos lasted = entry.value.effect.duration;
-  if (lasted > 0 && call.now - entry.value.startedAt >= lasted) entry.value.running = false;
+  const bool isTold = entry.untoldSince == kNever;
+  if (isTold && lasted > 0 && call.now - entry.value.startedAt >= lasted) entry.value.running = false;
   const std::uint32_t started = entry.value.effect.start;
   entry.value.effect = effect;
   entry.value.asked = c;
@@ -145,7 +147,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
   if (entry.value.running && effect.duration > 0)
     entry.goneAt = entry.value.startedAt + effect.duration + kAfterEnd;
   if (const auto waiting = waitingStarts_.find(c.index); waiting != waitingStarts_.end()) {
-    start(entry, waiting->second.owner, call.now);
+    start(entry, waiting->second.owner, call.now, call.now);
     waitingStarts_.erase(waiting);
   }
   if (entry.value.running) tellOfSum_.insert(call.client);
@@ -155,7 +157,7 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
 void FreeForces::start(std::int32_t index, Nanos at, const Call& call) {
   const auto known = effects_.find(index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
-    start(known->second, call.client, at);
+    start(known->second, call.client, at, call.now);
     tellOfSum_.insert(call.client);
     return;
   }
@@ -309,7 +311,9 @@ void FreeForces::letFieldLeave() {
 FreeForces::Constraint& FreeForces::constraintFor(const Call& call) {
   if (constraint_ && constraint_->value.releasing) {
     if (const auto field = fieldOf(constraint_->value))
-      addLeaving({constraint_->owner, *field, constraint_->goneAt, constraint_->outOfWorld}, leavingFields_);
+      addLeaving({constraint_->owner, *field, constraint_->goneAt, constraint_->outOfWorld,
+                  constraint_->untoldSince},
+                 leavingFields_);
     constraint_.reset();
   }
   if (!constraint_) {
@@ -407,7 +411,8 @@ void FreeForces::handle(StartCustomEffect& c, const Call& call) {
   buzz.duration = base::toNanos(std::min(p[2], kLongest_ms / 1000));
   buzz.start = ++starts_;
   buzz.owner = ownerOf(call.client);
-  buzz_ = {call.client, buzz, call.now + buzz.duration + kAfterEnd};
+  buzz_ = Owned<Buzz>{call.client, buzz};
+  buzz_->endAt(call.now + buzz.duration + kAfterEnd, call.now);
   asked_.keep(c, call.client);
   changed_ = true;
 }

@@ -62,9 +62,10 @@ class Similarity {
 
 }  // namespace
 
-FreeForces::FreeForces(const SceneConfig& config) : config_(config), bound_(config) {}
+FreeForces::FreeForces(const SceneConfig& config)
+    : config_(config), bound_(config), clock_(config.clock ? config.clock : config.stopwatch) {}
 
-void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at) {
+void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos now) {
   entry.owner = client;
   entry.value.running = true;
   entry.value.startedAt = at;
@@ -72,7 +73,8 @@ void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at) {
   entry.value.effect.releasing = false;
   entry.value.effect.owner = ownerOf(client);
   const Nanos duration = entry.value.effect.duration;
-  entry.goneAt = duration > 0 ? at + duration + kAfterEnd : kNever;
+  entry.untoldSince = kNever;
+  entry.endAt(duration > 0 ? at + duration + kAfterEnd : kNever, now);
   changed_ = true;
 }
 
@@ -277,7 +279,29 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double
   tellOfPlanes(forces, now, board, out);
   tellOfDetail(worldUnitsPerMetre, now, board, out);
   if (buzz_) forces.buzz = buzz_->value;
+  beginInServo(now);
   return forces;
+}
+
+// The servo starts and ramps by its own clock, from the tick that is given this publication. Large meshes in
+// it take longer to build than many a force lasts.
+void FreeForces::beginInServo(Nanos now) {
+  Nanos told = kNever;  // read once, and only for a force that ends: recordings keep each reading
+  const auto tell = [&](auto& owned) {
+    const Nanos since = std::exchange(owned.untoldSince, kNever);
+    if (since == kNever || owned.goneAt == kNever) return Nanos{0};
+    if (told == kNever) told = std::max(now, clock_ ? clock_() : now);
+    owned.goneAt += told - since;
+    return told - since;
+  };
+  for (auto& [index, entry] : effects_) entry.value.startedAt += tell(entry);
+  for (auto& entry : leavingEffects_) tell(entry);
+  for (auto& [index, entry] : planes_) tell(entry);
+  for (auto& entry : leavingFields_) tell(entry);
+  if (planeDetail_) tell(*planeDetail_);
+  if (field_) tell(*field_);
+  if (constraint_) tell(*constraint_);
+  if (buzz_) tell(*buzz_);
 }
 
 // By their owners, whichever client sent the command.
@@ -344,7 +368,7 @@ void FreeForces::release(const F& whose, Nanos now, bool endsWorld) {
     if (!whose(owned.owner) || releasing) return false;
     releasing = true;
     owned.outOfWorld = endsWorld;
-    owned.goneAt = std::min(owned.goneAt, now + kRelease);
+    owned.endAt(std::min(owned.goneAt, now + kRelease), now);
     return changed_ = true;
   };
   std::erase_if(effects_, [&](const auto& e) { return whose(e.second.owner) && !e.second.value.running; });
@@ -428,7 +452,9 @@ bool FreeForces::update(Nanos now, NoticeBoard& board, std::vector<Notice>& out)
               it->first);
     it = waitingStarts_.erase(it);
   }
-  const auto gone = [now](const auto& owned) { return now >= owned.goneAt; };
+  const auto gone = [now, since = std::exchange(updatedAt_, now)](const auto& owned) {
+    return owned.isGone(now, since);
+  };
   for (auto it = effects_.begin(); it != effects_.end();) {
     auto& [index, entry] = *it;
     if (!gone(entry)) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -41,6 +42,17 @@ struct OwnedForce {
   T value;
   Nanos goneAt = kNever;    ///< when it has ended or ramped out
   bool outOfWorld = false;  ///< ramps out since a reset ended its world: stays on the device
+  Nanos untoldSince = kNever;  ///< no snapshot has its start or its ramp yet; kNever: one has
+
+  /// Of a force that started, or ramps out from now on.
+  void endAt(Nanos at, Nanos now) {
+    goneAt = at;
+    untoldSince = std::min(untoldSince, now);
+  }
+  /// Not before a publication has told of it, unless the one after `since` failed.
+  bool isGone(Nanos now, Nanos since) const {
+    return now >= goneAt && (untoldSince == kNever || untoldSince < since);
+  }
 };
 
 struct RunningEffect {
@@ -131,8 +143,9 @@ class FreeForces {
   std::shared_ptr<const ForceOwner> ownerOf(ClientId client) const {
     return config_.owners ? config_.owners->of(client) : nullptr;
   }
-  void start(Owned<RunningEffect>& entry, ClientId client, Nanos at);
+  void start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos now);
   void start(std::int32_t index, Nanos at, const Call& call);
+  void beginInServo(Nanos now);
   template <class F>
   void release(const F& whose, Nanos now, bool endsWorld);
   std::size_t countEffects(bool releasing) const;
@@ -173,6 +186,8 @@ class FreeForces {
   std::uint32_t fieldNumbers_ = 0;  // the same for fields
   LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
+  const std::function<Nanos()> clock_;
+  Nanos updatedAt_ = 0;
   double heaviestSurface_Ns_per_m_ = 0;  // of objects, when last published
   double worldUnitsPerMetre_ = 1000;     // then
   double share_ = 1;                     // then, of what does not ramp out

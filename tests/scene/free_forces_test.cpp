@@ -134,12 +134,115 @@ TEST_F(Forces, AnEffectThatHasEndedStaysEndedWhenItIsDefinedAnew) {
 TEST_F(Forces, ARunningEffectGoesOnWithAnotherDuration) {
   say(constant(1, 100));
   say(StartEffect{1});
+  publish();
   wait(90 * kMillisecond);
   say(constant(1, 300));
   run(200 * kMillisecond);
   EXPECT_EQ(scene_->effects.size(), 1U);
   run(100 * kMillisecond);
   EXPECT_TRUE(scene_->effects.empty());
+}
+
+// A publication takes as long as its meshes: the servo is given all of it when it is over.
+class ForcesOfLongPublications : public Forces {
+ protected:
+  ForcesOfLongPublications() : Forces(config()) {}
+
+  static SceneConfig config() {
+    SceneConfig config;
+    config.clock = [] { return end_; };
+    return config;
+  }
+  void publishFor(Nanos time) {
+    end_ = now_ + time;
+    publish();
+    now_ = end_;
+  }
+
+  inline static Nanos end_ = 0;
+};
+
+TEST_F(ForcesOfLongPublications, TimedForcesLastFromTheEndOfTheirPublication) {
+  say(constant(1, 20));
+  say(StartEffect{1});
+  say(StartCustomEffect{0, {1, 40, 0.02, 0, 0, 1}});
+  publishFor(400 * kMillisecond);
+  run(60 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(scene_->buzz);
+  run(20 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+  EXPECT_FALSE(scene_->buzz);
+}
+
+TEST_F(ForcesOfLongPublications, AStartThatIsLateWaitsForItsPublication) {
+  say(constant(1, 20));
+  say(StartEffect{1});
+  wait(300 * kMillisecond);  // the thread applies much else before it publishes
+  say(constant(1, 20));
+  publish();
+  EXPECT_EQ(scene_->effects.size(), 1U);
+}
+
+TEST_F(ForcesOfLongPublications, AnotherDurationCountsFromThere) {
+  say(constant(1, 100));
+  say(StartEffect{1});
+  publishFor(400 * kMillisecond);
+  wait(90 * kMillisecond);
+  say(constant(1, 200));
+  run(130 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U) << "it runs for 220 ms";
+  run(40 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+}
+
+TEST_F(ForcesOfLongPublications, WhatRampsOutDoesFromThere) {
+  say(constant(1));
+  say(StartEffect{1});
+  say(SetPlane{.index = 0, .plane = {0, 1, 0, 0}, .stiffness = 0.5});
+  say(SetForceField{.force_N = Vec3(0, 1, 0), .radius_m = 1});
+  say(SetConstraintEnabled{true});
+  say(SetConstraintMode{1});
+  publish();
+  say(ResetScene{});
+  publishFor(400 * kMillisecond);
+  run(250 * kMillisecond);
+  ASSERT_EQ(scene_->effects.size(), 1U);
+  EXPECT_TRUE(scene_->effects[0].releasing);
+  EXPECT_EQ(scene_->planes.size(), 1U);
+  EXPECT_EQ(scene_->fields.size(), 2U);
+  run(60 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+  EXPECT_TRUE(scene_->planes.empty());
+  EXPECT_TRUE(scene_->fields.empty());
+}
+
+// Else it would begin with the next command of anybody, whenever that comes.
+TEST(ForcesOfFailedPublications, AreNotFeltLater) {
+  bool isFull = false;
+  SceneConfig config;
+  config.stopwatch = [&]() -> Nanos {
+    if (isFull) throw std::bad_alloc();
+    return 0;
+  };
+  SceneBuilder builder(config);
+  std::vector<Notice> notices;
+  Nanos now = kMillisecond;
+  builder.publish(now, notices);
+  builder.apply(7, SetObjectNumber{1}, now, notices);
+  builder.apply(7, SetVertices{0, 0, oneTriangle()}, now, notices);
+  builder.apply(7, DefineEffect{.type = "constant", .index = 1, .magnitude_N = 1, .duration_ms = 20}, now,
+                notices);
+  builder.apply(7, StartEffect{1}, now, notices);
+  isFull = true;
+  now += kMillisecond;
+  EXPECT_THROW(builder.publish(now, notices), std::bad_alloc);
+  isFull = false;
+  now += 1000 * kMillisecond;
+  builder.apply(7, SetTouchableFaces{}, now, notices);
+  const auto scene = builder.publish(now, notices);
+  ASSERT_TRUE(scene);
+  EXPECT_TRUE(scene->effects.empty());
 }
 
 // 0 lasts until the effect is stopped: neither less nor almost nothing may become it unnoticed.
