@@ -40,7 +40,6 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
     : config_((validate(config), config)),
       throttledLog_(static_cast<std::size_t>(config_.limits.log_kB_per_s) * 1000),
       credentials_(config, geteuid()),
-      tls_(openTls(config)),
       trusted_(parseSubnets(config.trustedNetworks)),
       player_(std::move(player)),
       recordings_(scenes_, stations_,
@@ -55,6 +54,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Player> player)
                      for (const auto& station : stations_) sendText(*station, text);
                    }}) {
   loop_.setErrorHandler([](std::string_view text) { spdlog::error("{}", text); });
+  if (auto context = openTls(config)) tls_.emplace(*std::move(context), loop_);
   names_.addSender("VRPN Control");  // must be sender 0, as in stock VRPN
   if (!config_.record.empty()) recordings_.create(config_.record);
 
@@ -113,7 +113,7 @@ bool Server::isEncrypted(const Session& session) const {
 // An empty connection: refused.
 net::Connection Server::secured(net::Connection connection) {
   if (isNear(connection.remote().address)) return connection;
-  if (tls_) return tls::wrap(*tls_, std::move(connection));
+  if (tls_) return tls_->wrap(std::move(connection));
   if (config_.insecure) return connection;
   throttledLog_.warnOfLasting("connection from " + connection.remote().addressText() +
                               " refused: its network is not in trusted_networks, and tls is off");

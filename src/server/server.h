@@ -136,7 +136,7 @@ class Server final : public SessionOwner, public WebOwner, public HaplyOwner {
   WallClock clock_;
   ThrottledLog throttledLog_;
   Credentials credentials_;
-  std::optional<tls::Context> tls_;  ///< empty: off
+  std::optional<tls::Acceptor> tls_;  ///< empty: off
   std::vector<Subnet> trusted_;
   wire::LocalNames names_;
   std::unique_ptr<Player> player_;  ///< null unless a recording is replayed

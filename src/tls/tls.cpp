@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "net/connection_impl.h"
+#include "tls/handshakes.h"
 
 namespace hapticd::tls {
 namespace {
@@ -30,7 +31,6 @@ struct Freeing {
   }
 };
 using SslContext = std::unique_ptr<SSL_CTX, Freeing<SSL_CTX_free>>;
-using Ssl = std::unique_ptr<SSL, Freeing<SSL_free>>;
 using Certificate = std::unique_ptr<X509, Freeing<X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Freeing<EVP_PKEY_free>>;
 
@@ -170,12 +170,45 @@ const std::string& Context::fingerprint() const noexcept {
 
 namespace {
 
+// Of a certificate that is checked, OpenSSL's reason does not say what is wrong with it.
+std::string whyFailed(const SSL* ssl) {
+  const std::string why = reason();
+  const long verdict = SSL_get_verify_result(ssl);
+  if (verdict == X509_V_OK || (SSL_get_verify_mode(ssl) & SSL_VERIFY_PEER) == 0) return why;
+  const bool ofTheTime = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED;
+  return why + ": " + X509_verify_cert_error_string(verdict) +
+         (ofTheTime ? ", or the clock of this machine is wrong" : "");
+}
+
+struct Progress {
+  enum { waits, done, failed } state = waits;
+  std::string why;
+};
+
+// As far as the bytes that have arrived lead.
+Progress handshake(SSL* ssl) {
+  ERR_clear_error();
+  const int result = SSL_do_handshake(ssl);
+  if (result == 1) return {Progress::done, ""};
+  if (SSL_get_error(ssl, result) == SSL_ERROR_WANT_READ) return {};
+  return {Progress::failed, whyFailed(ssl)};
+}
+
+// Where a server computes its handshakes, and where it goes on with the result.
+struct Elsewhere {
+  std::shared_ptr<Handshakes> handshakes;  // null: a client, which computes them at once
+  net::Loop* loop = nullptr;
+};
+
 // OpenSSL works on memory; the bytes travel by the connection underneath, which has the queue, its limits,
 // loss detection and pauses.
 class TlsConnection final : public net::Connection::Impl, public std::enable_shared_from_this<TlsConnection> {
  public:
-  TlsConnection(std::shared_ptr<Context::Impl> context, net::Connection stream)
-      : context_(std::move(context)), stream_(std::move(stream)), ssl_(SSL_new(context_->context.get())) {
+  TlsConnection(std::shared_ptr<Context::Impl> context, net::Connection stream, Elsewhere elsewhere)
+      : context_(std::move(context)),
+        stream_(std::move(stream)),
+        elsewhere_(std::move(elsewhere)),
+        ssl_(SSL_new(context_->context.get()), SSL_free) {
     if (!ssl_) throw Error("TLS: " + reason());
     SSL_set_bio(ssl_.get(), BIO_new(BIO_s_mem()), BIO_new(BIO_s_mem()));  // which it then owns
     if (context_->isServer) {
@@ -195,7 +228,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
     const auto own = handlers_;
     stream_.start({.onConnected =
                        [weak] {
-                         if (const auto self = weak.lock()) self->handshake();
+                         if (const auto self = weak.lock()) self->shake();
                        },
                    .onBytes =
                        [weak](std::span<const std::byte> bytes) {
@@ -221,7 +254,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
 
   void send(std::shared_ptr<const net::Buffer> buffer, net::Delivery delivery) override {
     if (!sendable() || !buffer || buffer->empty()) return;
-    if (!SSL_is_init_finished(ssl_.get())) {
+    if (!established_) {
       if (delivery == net::Delivery::lowLatency) return drop(buffer->size());
       waitingBytes_ += buffer->size();
       if (waitingBytes_ > kMostWaiting) return abort("the peer does not finish the TLS handshake");
@@ -239,7 +272,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
   }
 
   void close(std::string why) override {
-    if (sendable() && SSL_is_init_finished(ssl_.get())) {
+    if (sendable() && established_) {
       SSL_shutdown(ssl_.get());
       passOn();
     }
@@ -293,6 +326,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
 
   // Moves what OpenSSL has written into the queue of the stream.
   void passOn() {
+    if (shaking_) return;
     BIO* const out = SSL_get_wbio(ssl_.get());
     const std::size_t size = BIO_ctrl_pending(out);
     if (size == 0 || !stream_) return;
@@ -303,34 +337,39 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
     stream_.send(std::move(buffer), net::Delivery::reliable);
   }
 
-  // Of a certificate that is checked, OpenSSL's reason does not say what is wrong with it.
-  std::string whyFailed() const {
-    const std::string why = reason();
-    const long verdict = SSL_get_verify_result(ssl_.get());
-    if (verdict == X509_V_OK || (SSL_get_verify_mode(ssl_.get()) & SSL_VERIFY_PEER) == 0) return why;
-    const bool ofTheTime = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED;
-    return why + ": " + X509_verify_cert_error_string(verdict) +
-           (ofTheTime ? ", or the clock of this machine is wrong" : "");
+  // Until the result is here, nothing else touches what OpenSSL knows of the connection. A job for one that
+  // is gone does nothing.
+  void shake() {
+    if (!elsewhere_.handshakes) return goOn(handshake(ssl_.get()));
+    shaking_ = true;
+    elsewhere_.handshakes->post(
+        stream_.remote().address,
+        [weak = weak_from_this(), waiting = std::weak_ptr(ssl_), loop = elsewhere_.loop] {
+          const auto ssl = waiting.lock();
+          if (!ssl) return;
+          loop->post([weak, progress = handshake(ssl.get())] {
+            if (const auto self = weak.lock()) self->goOn(progress);
+          });
+        });
   }
 
-  void handshake() {
-    ERR_clear_error();
-    const int result = SSL_do_handshake(ssl_.get());
-    const bool waits = SSL_get_error(ssl_.get(), result) == SSL_ERROR_WANT_READ;
-    if (result == 1 && !isKnown()) return;
-    if (result != 1 && !waits) {
-      const std::string why = whyFailed();
+  void goOn(const Progress& progress) {
+    shaking_ = false;
+    if (closing_ || !stream_) return;
+    if (progress.state == Progress::failed) {
       flush();  // the alert names the reason to the peer
-      return fail("TLS handshake failed: " + why);
+      return fail("TLS handshake failed: " + progress.why);
     }
-    if (result == 1) {
+    if (progress.state == Progress::done) {
+      if (!isKnown()) return;
+      established_ = true;
       for (const auto& buffer : std::exchange(waiting_, {})) encrypt(*buffer);
       waitingBytes_ = 0;
     }
     flush();
-    if (result != 1) return;
     const auto handlers = handlers_;
-    if (!context_->isServer && handlers && handlers->onConnected) handlers->onConnected();
+    if (established_ && !context_->isServer && handlers && handlers->onConnected) handlers->onConnected();
+    if (established_ || !arrived_.empty()) receive(std::exchange(arrived_, {}));
   }
 
   bool isKnown() {
@@ -343,10 +382,21 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
   }
 
   void receive(std::span<const std::byte> bytes) {
+    if (shaking_) {
+      arrived_.insert(arrived_.end(), bytes.begin(), bytes.end());
+      if (arrived_.size() > kMostWaiting) abort("more arrives than belongs to a TLS handshake");
+      return;
+    }
     std::size_t taken = 0;
-    BIO_write_ex(SSL_get_rbio(ssl_.get()), bytes.data(), bytes.size(), &taken);
-    if (!SSL_is_init_finished(ssl_.get())) handshake();
-    if (!failure_.empty() || !SSL_is_init_finished(ssl_.get())) return;
+    if (!bytes.empty()) BIO_write_ex(SSL_get_rbio(ssl_.get()), bytes.data(), bytes.size(), &taken);
+    if (established_) {
+      read();
+    } else {
+      shake();
+    }
+  }
+
+  void read() {
     ERR_clear_error();
     net::Buffer plain;
     std::size_t size = 0;
@@ -379,7 +429,11 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
 
   const std::shared_ptr<Context::Impl> context_;
   net::Connection stream_;
-  Ssl ssl_;
+  const Elsewhere elsewhere_;
+  const std::shared_ptr<SSL> ssl_;
+  bool shaking_ = false;      // the thread of the handshakes has ssl_
+  bool established_ = false;  // the handshake is over
+  net::Buffer arrived_;       // while shaking
   // Shared, so that the captures of a callback outlive a connection that it destroys.
   std::shared_ptr<net::ConnectionHandlers> handlers_;
   std::vector<std::shared_ptr<const net::Buffer>> waiting_;  // for the end of the handshake
@@ -393,7 +447,19 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
 }  // namespace
 
 net::Connection wrap(const Context& context, net::Connection stream) {
-  return net::Connection(std::make_shared<TlsConnection>(context.impl(), std::move(stream)));
+  return net::Connection(std::make_shared<TlsConnection>(context.impl(), std::move(stream), Elsewhere{}));
+}
+
+Acceptor::Acceptor(Context context, net::Loop& loop)
+    : context_(std::move(context)), loop_(loop), handshakes_(std::make_shared<Handshakes>()) {}
+
+Acceptor::~Acceptor() {
+  handshakes_->stop();
+}
+
+net::Connection Acceptor::wrap(net::Connection stream) {
+  return net::Connection(
+      std::make_shared<TlsConnection>(context_.impl(), std::move(stream), Elsewhere{handshakes_, &loop_}));
 }
 
 }  // namespace hapticd::tls

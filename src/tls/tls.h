@@ -6,8 +6,11 @@
 #include <string>
 
 #include "net/connection.h"
+#include "net/loop.h"
 
 namespace hapticd::tls {
+
+class Handshakes;
 
 /// A certificate or key that cannot be used; the text names the file and the remedy.
 class Error : public net::Error {
@@ -46,9 +49,28 @@ class Context {
   std::shared_ptr<Impl> impl_;
 };
 
-/// Puts TLS around a connection that is not yet started. Bytes sent before the end of the handshake wait for
-/// it. Low-latency buffers are dropped as a whole while the peer is behind. A failed handshake ends the
-/// connection; the reason names the certificate that was refused.
+/// Puts TLS around a connection of a client that is not yet started. Bytes sent before the end of the
+/// handshake wait for it. Low-latency buffers are dropped as a whole while the peer is behind. A failed
+/// handshake ends the connection; the reason names the certificate that was refused.
 net::Connection wrap(const Context& context, net::Connection stream);
+
+/// Does the same for the connections of a server. A thread of its own computes the handshakes. For the thread
+/// of the loop, which must outlive it.
+class Acceptor {
+ public:
+  Acceptor(Context context, net::Loop& loop);
+  /// Handshakes that are under way never end.
+  ~Acceptor();
+  Acceptor(const Acceptor&) = delete;
+  Acceptor& operator=(const Acceptor&) = delete;
+
+  net::Connection wrap(net::Connection stream);
+  const std::string& fingerprint() const noexcept { return context_.fingerprint(); }
+
+ private:
+  const Context context_;
+  net::Loop& loop_;
+  const std::shared_ptr<Handshakes> handshakes_;
+};
 
 }  // namespace hapticd::tls

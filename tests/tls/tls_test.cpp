@@ -13,8 +13,10 @@
 #include <optional>
 #include <string>
 
+#include "base/fake_world.h"
 #include "net/loop.h"
 #include "net/tcp_listener.h"
+#include "tls/handshakes.h"
 
 namespace hapticd::tls {
 namespace {
@@ -45,9 +47,10 @@ struct Side {
 class TlsTest : public ::testing::Test {
  protected:
   void connect(const Context& client, const std::string& first = "") {
+    acceptor_.emplace(context_, loop_);
     listener_.emplace(loop_, net::Endpoint{net::kLoopbackAddress, 0},
                       [this, first](net::Connection accepted) {
-                        server_.start(wrap(context_, std::move(accepted)));
+                        server_.start(acceptor_->wrap(std::move(accepted)));
                         if (!first.empty()) server_.send(first);
                       });
     client_.start(wrap(client, net::Connection::connect(loop_, listener_->local(), 20s)));
@@ -59,6 +62,7 @@ class TlsTest : public ::testing::Test {
 
   net::Loop loop_;
   Context context_ = Context::serverWithNewKey();
+  std::optional<Acceptor> acceptor_;
   std::optional<net::TcpListener> listener_;
   Side server_;
   Side client_;
@@ -149,13 +153,82 @@ TEST_F(TlsTest, ACertificateThatIsRefusedIsSaidToBeWrongInWhat) {
 }
 
 TEST_F(TlsTest, AClientWithoutTlsIsRefused) {
-  listener_.emplace(loop_, net::Endpoint{net::kLoopbackAddress, 0},
-                    [this](net::Connection accepted) { server_.start(wrap(context_, std::move(accepted))); });
+  acceptor_.emplace(context_, loop_);
+  listener_.emplace(loop_, net::Endpoint{net::kLoopbackAddress, 0}, [this](net::Connection accepted) {
+    server_.start(acceptor_->wrap(std::move(accepted)));
+  });
   client_.start(net::Connection::connect(loop_, listener_->local(), 20s));
   client_.send("vrpn: ver. 07.35  0");
   ASSERT_TRUE(until([&] { return server_.ended.has_value(); }));
   EXPECT_NE(server_.ended->find("TLS handshake failed"), std::string::npos) << *server_.ended;
   EXPECT_EQ(server_.received, "");
+}
+
+// Else strangers who ask for handshakes with a large key keep a stop waiting.
+TEST_F(TlsTest, TheLoopOfAServerComputesNoHandshake) {
+  const base::World& real = base::world();
+  base::SimulatedClock clock;
+  base::FakeThreads threads(clock);
+  const base::ScopedWorld world({real.clock, threads, real.files, real.random});
+  connect(Context::clientThatKnows(context_.fingerprint()));
+  client_.send("early");
+  ASSERT_TRUE(until([&] { return threads.nextDeadline().has_value(); })) << "a handshake is to be computed";
+  for (int i = 0; i < 20; ++i) loop_.runOnce(1ms);
+  EXPECT_EQ(server_.connection.statistics().bytesOut, 0U) << "nobody has computed it";
+  const auto computed = [&](const auto& done) {
+    return until([&] {
+      threads.runDue();
+      return done();
+    });
+  };
+  ASSERT_TRUE(computed([&] { return server_.received == "early"; }));
+
+  connect(Context::clientThatKnows(context_.fingerprint()));  // the old connections end
+  ASSERT_TRUE(until([&] { return threads.nextDeadline().has_value(); }));
+  server_ = {};
+  threads.runDue();
+  loop_.runOnce(0ms);  // its result finds nobody
+  acceptor_.reset();
+}
+
+TEST_F(TlsTest, MoreThanBelongsToAHandshakeEndsTheConnection) {
+  const base::World& real = base::world();
+  base::SimulatedClock clock;
+  base::FakeThreads threads(clock);
+  const base::ScopedWorld world({real.clock, threads, real.files, real.random});
+  acceptor_.emplace(context_, loop_);
+  listener_.emplace(loop_, net::Endpoint{net::kLoopbackAddress, 0}, [this](net::Connection accepted) {
+    server_.start(acceptor_->wrap(std::move(accepted)));
+  });
+  client_.start(net::Connection::connect(loop_, listener_->local(), 20s));
+  for (int i = 0; i < 40; ++i) client_.send(std::string(100'000, 'x'));
+  ASSERT_TRUE(until([&] { return server_.ended.has_value(); }));
+  EXPECT_NE(server_.ended->find("more arrives than belongs to a TLS handshake"), std::string::npos);
+  acceptor_.reset();
+}
+
+TEST(Handshakes, AreComputedInTurnByAddressUntilTheyStop) {
+  const base::World& real = base::world();
+  base::SimulatedClock clock;
+  base::FakeThreads threads(clock);
+  const base::ScopedWorld world({real.clock, threads, real.files, real.random});
+  std::string order;
+  Handshakes handshakes;
+  const auto post = [&](std::uint32_t address, char name) {
+    handshakes.post(address, [&order, name] { order += name; });
+  };
+  for (const char name : {'a', 'b', 'c', 'd'}) post(7, name);
+  post(9, 'X');
+  post(5, 'Y');
+  handshakes.post(9, [] { throw std::bad_alloc(); });
+  post(9, 'Z');
+  threads.runDue();
+  EXPECT_EQ(order, "YaXbcZd");
+  post(7, 'e');
+  handshakes.stop();
+  post(7, 'f');
+  threads.runDue();
+  EXPECT_EQ(order, "YaXbcZd");
 }
 
 TEST_F(TlsTest, AnUnfinishedHandshakeHoldsABoundedAmount) {
