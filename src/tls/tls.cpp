@@ -77,12 +77,20 @@ void requirePrivate(const std::string& file) {
     throw KeyError("TLS: others than its owner may use the key '" + file + "': chmod 0600 " + file);
 }
 
+// OpenSSL calls it for each message of TLS itself; `counter` counts the new keys that the peer asked for.
+void noteMessage(int sent, int /*version*/, int type, const void* bytes, std::size_t size, SSL* /*ssl*/,
+                 void* counter) {
+  if (sent != 0 || type != SSL3_RT_HANDSHAKE || size == 0 || counter == nullptr) return;
+  if (*static_cast<const unsigned char*>(bytes) == SSL3_MT_KEY_UPDATE) ++*static_cast<std::size_t*>(counter);
+}
+
 SslContext newContext(const SSL_METHOD* method) {
   SslContext context(SSL_CTX_new(method));
   if (!context || SSL_CTX_set_min_proto_version(context.get(), TLS1_3_VERSION) != 1)
     throw Error("TLS: this OpenSSL has no TLS 1.3: " + reason());
   SSL_CTX_set_num_tickets(context.get(), 0);  // sessions are long: nobody resumes one
   SSL_CTX_set_mode(context.get(), SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_RELEASE_BUFFERS);
+  SSL_CTX_set_msg_callback(context.get(), noteMessage);
   return context;
 }
 
@@ -308,6 +316,10 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
  private:
   static constexpr std::size_t kMostWaiting = std::size_t{1} << 20;
   static constexpr std::size_t kRecord = 16384;
+  // New keys take 50 us, in answer to 27 bytes: a piece has no more of them than take some milliseconds.
+  static constexpr std::size_t kPiece = 2048;
+  static constexpr std::size_t kFreeKeyUpdates = 32;
+  static constexpr std::size_t kBytesForKeys = std::size_t{1} << 20;
 
   void drop(std::size_t bytes) {
     ++droppedBuffers_;
@@ -363,6 +375,7 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
     if (progress.state == Progress::done) {
       if (!isKnown()) return;
       established_ = true;
+      SSL_set_msg_callback_arg(ssl_.get(), &keyUpdates_);
       for (const auto& buffer : std::exchange(waiting_, {})) encrypt(*buffer);
       waitingBytes_ = 0;
     }
@@ -387,18 +400,38 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
       if (arrived_.size() > kMostWaiting) abort("more arrives than belongs to a TLS handshake");
       return;
     }
-    std::size_t taken = 0;
-    if (!bytes.empty()) BIO_write_ex(SSL_get_rbio(ssl_.get()), bytes.data(), bytes.size(), &taken);
-    if (established_) {
-      read();
-    } else {
-      shake();
+    if (!established_) {
+      const auto piece = bytes.first(std::min(bytes.size(), kPiece));
+      arrived_.assign(bytes.begin() + static_cast<std::ptrdiff_t>(piece.size()), bytes.end());
+      give(piece);
+      return shake();
     }
+    net::Buffer plain;
+    std::optional<std::string> end;  // why
+    do {
+      const auto piece = bytes.first(std::min(bytes.size(), kPiece));
+      bytes = bytes.subspan(piece.size());
+      give(piece);
+      end = read(plain);
+    } while (!bytes.empty() && !end);
+    received_ += plain.size();
+    flush();  // answers of TLS itself
+    const auto handlers = handlers_;
+    if (!plain.empty() && handlers && handlers->onBytes) handlers->onBytes(plain);
+    if (!end || !stream_) return;
+    if (!end->empty()) return fail(*std::move(end));
+    closing_ = true;
+    stream_.close("closed by the peer");
   }
 
-  void read() {
+  void give(std::span<const std::byte> bytes) {
+    std::size_t taken = 0;
+    if (!bytes.empty()) BIO_write_ex(SSL_get_rbio(ssl_.get()), bytes.data(), bytes.size(), &taken);
+  }
+
+  // Appends what has arrived. Why the connection ends, if it does: empty when the peer says so.
+  std::optional<std::string> read(net::Buffer& plain) {
     ERR_clear_error();
-    net::Buffer plain;
     std::size_t size = 0;
     do {
       const std::size_t before = plain.size();
@@ -408,18 +441,11 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
       plain.resize(before + size);
     } while (size > 0);
     const int state = SSL_get_error(ssl_.get(), 0);
-    const bool ended = state == SSL_ERROR_ZERO_RETURN;
-    const bool broken = !ended && state != SSL_ERROR_WANT_READ;
-    const std::string why = broken ? reason() : "";
-    flush();  // answers of TLS itself
-    const auto handlers = handlers_;
-    if (!plain.empty() && handlers && handlers->onBytes) handlers->onBytes(plain);
-    if (broken) {
-      fail("TLS: " + why);
-    } else if (ended && stream_) {
-      closing_ = true;
-      stream_.close("closed by the peer");
-    }
+    if (state == SSL_ERROR_ZERO_RETURN) return "";
+    if (state != SSL_ERROR_WANT_READ) return "TLS: " + reason();
+    if (keyUpdates_ > kFreeKeyUpdates + (received_ + plain.size()) / kBytesForKeys)
+      return "the peer asks for new TLS keys again and again";
+    return std::nullopt;
   }
 
   void fail(std::string why) {
@@ -438,6 +464,8 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
   std::shared_ptr<net::ConnectionHandlers> handlers_;
   std::vector<std::shared_ptr<const net::Buffer>> waiting_;  // for the end of the handshake
   std::size_t waitingBytes_ = 0;
+  std::size_t keyUpdates_ = 0;
+  std::size_t received_ = 0;  // bytes, plain
   std::string failure_;
   bool closing_ = false;
   std::uint64_t droppedBuffers_ = 0;

@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
+#include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -205,6 +207,71 @@ TEST_F(TlsTest, MoreThanBelongsToAHandshakeEndsTheConnection) {
   ASSERT_TRUE(until([&] { return server_.ended.has_value(); }));
   EXPECT_NE(server_.ended->find("more arrives than belongs to a TLS handshake"), std::string::npos);
   acceptor_.reset();
+}
+
+// A client that does with TLS what ours never does.
+class HostileClient {
+ public:
+  explicit HostileClient(net::Connection stream) : stream_(std::move(stream)) {
+    SSL_set_bio(ssl_.get(), BIO_new(BIO_s_mem()), BIO_new(BIO_s_mem()));
+    SSL_set_connect_state(ssl_.get());
+    stream_.start({.onConnected = [this] { step(); },
+                   .onBytes =
+                       [this](auto bytes) {
+                         BIO_write(SSL_get_rbio(ssl_.get()), bytes.data(), static_cast<int>(bytes.size()));
+                         step();
+                       },
+                   .onClosed = [](const std::string&) {}});
+  }
+
+  bool established() const { return SSL_is_init_finished(ssl_.get()) == 1; }
+  void askForKeys(int times) {
+    for (int i = 0; i < times; ++i) {
+      SSL_key_update(ssl_.get(), SSL_KEY_UPDATE_REQUESTED);
+      SSL_do_handshake(ssl_.get());
+    }
+    step();
+  }
+  void send(const std::string& text) {
+    SSL_write(ssl_.get(), text.data(), static_cast<int>(text.size()));
+    step();
+  }
+
+ private:
+  void step() {
+    SSL_do_handshake(ssl_.get());
+    char ignored[64];
+    while (established() && SSL_read(ssl_.get(), ignored, sizeof(ignored)) > 0) continue;
+    net::Buffer out(BIO_ctrl_pending(SSL_get_wbio(ssl_.get())));
+    if (!out.empty()) BIO_read(SSL_get_wbio(ssl_.get()), out.data(), static_cast<int>(out.size()));
+    stream_.send(std::span<const std::byte>(out));
+    stream_.flush();
+  }
+
+  std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context_{SSL_CTX_new(TLS_client_method()), SSL_CTX_free};
+  std::unique_ptr<SSL, decltype(&SSL_free)> ssl_{SSL_new(context_.get()), SSL_free};
+  net::Connection stream_;
+};
+
+// Each answer to 27 bytes takes the loop 50 us.
+TEST_F(TlsTest, OnlySoManyNewKeysAreMadeForAClient) {
+  acceptor_.emplace(context_, loop_);
+  listener_.emplace(loop_, net::Endpoint{net::kLoopbackAddress, 0}, [this](net::Connection accepted) {
+    server_.start(acceptor_->wrap(std::move(accepted)));
+  });
+  HostileClient client(net::Connection::connect(loop_, listener_->local(), 20s));
+  ASSERT_TRUE(until([&] { return client.established(); }));
+  client.askForKeys(20);
+  client.send("still here");
+  EXPECT_TRUE(until([&] { return server_.received == "still here"; }));
+  client.send(std::string(3'000'000, 'x'));
+  client.askForKeys(14);
+  client.send("and after 3 MB");
+  EXPECT_TRUE(until([&] { return server_.received.ends_with("and after 3 MB"); }));
+  EXPECT_FALSE(server_.ended);
+  client.askForKeys(1000);
+  ASSERT_TRUE(until([&] { return server_.ended.has_value(); }));
+  EXPECT_EQ(*server_.ended, "the peer asks for new TLS keys again and again");
 }
 
 TEST(Handshakes, AreComputedInTurnByAddressUntilTheyStop) {
