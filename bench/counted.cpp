@@ -75,19 +75,47 @@ void decode(int rounds) {
   for (int i = 0; i < rounds; ++i) to.feed({}, bytes, add);
 }
 
+// Bodies that all move by themselves, as in a simulation of physics, and their publication.
+void poses(int rounds) {
+  constexpr std::int32_t kBodies = 24;
+  scene::SceneConfig config;
+  config.checkMeshes = false;
+  scene::SceneBuilder builder(config);
+  std::vector<scene::Notice> notices;
+  base::Nanos now = 0;
+  geometry::TriangleMesh triangle;
+  triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  triangle.triangles = {{0, 1, 2}};
+  for (std::int32_t body = 0; body < kBodies; ++body) bench::tell(builder, body, triangle, now);
+  for (int i = 0; i < rounds; ++i) {
+    now += 1'000'000'000;  // the meshes are due, and each motion is over when the next one begins
+    builder.apply(1, scene::BeginBatch{}, now, notices);
+    for (std::int32_t body = 0; body < kBodies; ++body) {
+      scene::SetTransform pose{body, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+      pose.matrix[12] = 0.01 * ((i + 1) % 2) * (body + 1);
+      builder.apply(1, std::move(pose), now, notices);
+    }
+    builder.apply(1, scene::CommitBatch{}, now, notices);
+    const auto snapshot = builder.publish(now, notices);
+    sum += static_cast<double>(snapshot->objects.size());
+  }
+}
+
 void run(const std::string& what, int rounds) {
   for (const bench::Act act : bench::kActs) {
     if (what == bench::nameOf(act)) return ticks(act, rounds);
   }
   if (what == "encode") return encode(rounds);
   if (what == "decode") return decode(rounds);
+  if (what == "poses") return poses(rounds);
   throw std::invalid_argument("nothing is called '" + what + "'");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 3) throw std::invalid_argument("usage: hapticd_counted contact|slide|tap|encode|decode ROUNDS");
+  if (argc != 3)
+    throw std::invalid_argument("usage: hapticd_counted contact|slide|tap|encode|decode|poses ROUNDS");
   run(argv[1], std::stoi(argv[2]));
   std::printf("%g\n", sum);
   return 0;

@@ -205,11 +205,16 @@ std::optional<ObjectTable::Move> ObjectTable::moveOf(Object& object, const Call&
 // way: no gap opens between the parts of what turns.
 void ObjectTable::updateMotions(Nanos now, NoticeBoard& board, std::vector<Notice>& out) {
   constexpr double kTogether_m = 0.5e-6;
+  const double together = kTogether_m * worldUnitsPerMetre_;
   // Of those of one batch, so that thousands that move by themselves take no longer.
   const std::size_t mostLeaders =
       std::clamp<std::size_t>(65'536 / std::max<std::size_t>(changed_.size(), 1), 4, 64);
+  struct Leader {
+    std::size_t move;
+    Affine map;  // of the world, by which it moves
+  };
   std::vector<Move> moves;
-  std::vector<std::size_t> leaders;
+  std::vector<Leader> leaders;
   for (const std::int32_t id : changed_) {
     Object* object = find(id);
     if (object == nullptr || !std::exchange(object->moved, false)) continue;
@@ -217,17 +222,22 @@ void ObjectTable::updateMotions(Nanos now, NoticeBoard& board, std::vector<Notic
     std::optional<Move> move = moveOf(*object, Call{object->meshSetBy, now, false, board, out});
     if (!move) continue;
     move->leader = moves.size();
-    const auto asOne = [&](std::size_t k) {
-      const Affine led = moves[k].to * (moves[k].from.inverse() * move->from);
-      return longestMove(led, move->to, move->bounds) <= kTogether_m * worldUnitsPerMetre_;
+    // One corner tells most objects apart.
+    const Vec3 before = move->from * move->bounds.min;
+    const Vec3 after = move->to * move->bounds.min;
+    const auto asOne = [&](const Leader& leader) {
+      if ((leader.map * before - after).norm() > 2 * together) return false;
+      const Move& its = moves[leader.move];
+      const Affine led = its.to * (its.from.inverse() * move->from);
+      return longestMove(led, move->to, move->bounds) <= together;
     };
     const auto oldest = leaders.end() - static_cast<std::ptrdiff_t>(std::min(leaders.size(), mostLeaders));
     const auto leader = std::find_if(oldest, leaders.end(), asOne);
     if (leader == leaders.end()) {
-      leaders.push_back(move->leader);
+      leaders.push_back({move->leader, move->to * move->from.inverse()});
     } else {
-      move->leader = *leader;
-      moves[*leader].travel = std::max(moves[*leader].travel, move->travel);
+      move->leader = leader->move;
+      moves[leader->move].travel = std::max(moves[leader->move].travel, move->travel);
     }
     moves.push_back(*move);
   }
