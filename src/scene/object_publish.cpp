@@ -226,7 +226,8 @@ void ObjectTable::updateMotions(Nanos now, NoticeBoard& board, std::vector<Notic
     const Vec3 before = move->from * move->bounds.min;
     const Vec3 after = move->to * move->bounds.min;
     const auto asOne = [&](const Leader& leader) {
-      if ((leader.map * before - after).norm() > 2 * together) return false;
+      const Vec3 there = leader.map.linear() * before + leader.map.translation();
+      if ((there - after).squaredNorm() > 4 * together * together) return false;
       const Move& its = moves[leader.move];
       const Affine led = its.to * (its.from.inverse() * move->from);
       return longestMove(led, move->to, move->bounds) <= together;
