@@ -620,6 +620,36 @@ test("paused plots are saved with the marks of their time", async () => {
   await end(viewer, server);
 });
 
+test("the letters L and M can be switched off, and Esc stops in any case", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const { page } = viewer;
+  const box = page.getByLabel("keys L and M");
+  const marks = async () => {
+    await page.keyboard.press("m");
+    return viewer.ask("viewer.marked");
+  };
+  assert.equal(await marks(), 1);
+  await box.uncheck();
+  await viewer.holdInAir();
+  await page.keyboard.press("l");
+  assert.equal(await viewer.ask("viewer.hand.held"), true);
+  assert.equal(await marks(), 1);
+  assert.equal(await page.isVisible("#mark kbd"), false);
+  await page.reload();
+  await viewer.connected();
+  assert.equal(await box.isChecked(), false);
+  assert.equal(await viewer.ask("document.activeElement === document.body"), true);
+  await page.keyboard.press("m");
+  assert.equal(await viewer.ask("viewer.marked"), 0);
+  await page.keyboard.press("Escape");
+  await until("a stop", async () => (await server.state()).devices[0].guard.stopped);
+  await box.check();
+  assert.equal(await marks(), 1);
+  assert.equal(await page.isVisible("#mark kbd"), true);
+  await end(viewer, server);
+});
+
 test("a page of a replay moves the hand of the live server that follows", async () => {
   const recording = join(folder, "short.haptics");
   const recorded = await Server.start(hapticd, { more: ["--record", recording] });
