@@ -615,8 +615,10 @@ test("paused plots are saved with the marks of their time", async () => {
     pause.click();
     return [held, plots.csv()];
   })()`);
-  assert.deepEqual([...held.matchAll(/^# [0-9.]+ (.*)$/gm)].map(([, label]) => label), ["within"]);
-  assert.deepEqual([...live.matchAll(/^# [0-9.]+ (.*)$/gm)].map(([, label]) => label), ["within", "after"]);
+  // Trips of a late tick may be among them.
+  const own = (csv) => [...csv.matchAll(/^# [0-9.]+ (within|after)$/gm)].map(([, label]) => label);
+  assert.deepEqual(own(held), ["within"]);
+  assert.deepEqual(own(live), ["within", "after"]);
   await end(viewer, server);
 });
 
