@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "client/vrpn_both_sides.h"
+#include "client/vrpn_device.h"
 #include "net/loopback.h"
 
 namespace hapticd {

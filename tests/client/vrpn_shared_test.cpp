@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <quat.h>
 #include <unistd.h>
+#include <vrpn_Connection.h>
 #include <vrpn_Shared.h>
 #include <vrpn_Thread.h>
 
