@@ -4,6 +4,8 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -146,43 +148,7 @@ nlohmann::json findingJson(const Finding& finding) {
           {"remedy", finding.remedy}};
 }
 
-int run(double seconds, std::uint16_t port, bool json) {
-  std::vector<Finding> findings;
-  const auto add = [&](const Finding& finding) {
-    if (!json) print(finding);
-    findings.push_back(finding);
-  };
-  const auto title = [&](const char* format, auto... arguments) {
-    if (json) return;
-    if constexpr (sizeof...(arguments) == 0) {
-      std::fputs(format, stdout);
-    } else {
-      std::printf(format, arguments...);
-    }
-    std::fflush(stdout);
-  };
-  title("realtime\n");
-  const Finding priority = realtimePriority();
-  const bool realtimeGranted = priority.verdict == Verdict::good;
-  add(priority);
-  add(memoryLock());
-  add(governor());
-  add(timerResolution());
-  add(preemption());
-  title("network\n");
-  add(portFree("TCP", port, [](net::Loop& loop, const net::Endpoint& local) {
-    const net::TcpListener listener(loop, local, [](net::Connection) {});
-  }));
-  add(portFree("UDP", port, [](net::Loop& loop, const net::Endpoint& local) {
-    const net::UdpSocket socket(loop, local);
-  }));
-  title("devices\n");
-  const std::vector<device::DriverReport> devices = device::findDevices();
-  if (!json) printDevices(devices);
-
-  title("loop, %g s at 1 kHz with the simulated hand\n", seconds);
-  const LoopCheck loop = measureLoop(seconds);
-  for (const std::string& line : loop.setup) title("        %s\n", line.c_str());
+Finding steadiness(const LoopCheck& loop, bool realtimeGranted) {
   char text[256];
   std::snprintf(
       text, sizeof text,
@@ -190,41 +156,118 @@ int run(double seconds, std::uint16_t port, bool json) {
       static_cast<unsigned long long>(loop.ticks), static_cast<unsigned long long>(loop.overruns),
       loop.wakeup_us.p50, loop.wakeup_us.p99, loop.wakeup_us.max, loop.compute_us.p99);
   const bool steady = loop.wakeup_us.p99 < 100 && loop.overruns * 1000 <= loop.ticks;
-  add({steady ? Verdict::good : Verdict::bad, text,
-       steady            ? ""
-       : realtimeGranted ? "close other programs, or use a kernel with PREEMPT_RT"
-                         : "get realtime rights for the loop; then close other programs"});
+  if (steady) return {Verdict::good, text, ""};
+  return {Verdict::bad, text,
+          realtimeGranted ? "close other programs, or use a kernel with PREEMPT_RT"
+                          : "get realtime rights for the loop; then close other programs"};
+}
 
-  title("a driver in its own process (--isolate), %g s\n", seconds);
-  add(isolation(seconds, realtimeGranted));
+std::string shortNumber(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
-  int bad = 0;
-  int notes = 0;
-  for (const Finding& finding : findings) {
-    bad += finding.verdict == Verdict::bad ? 1 : 0;
-    notes += finding.verdict == Verdict::note ? 1 : 0;
+// Prints each finding at once, or all of them as JSON with the verdict.
+class Examination {
+ public:
+  explicit Examination(bool json) : json_(json) {}
+
+  void examineSystem() {
+    title("realtime");
+    const Finding priority = realtimePriority();
+    realtimeGranted_ = priority.verdict == Verdict::good;
+    add(priority);
+    add(memoryLock());
+    add(governor());
+    add(timerResolution());
+    add(preemption());
   }
-  if (json) {
+  void examinePorts(std::uint16_t port) {
+    title("network");
+    add(portFree("TCP", port, [](net::Loop& loop, const net::Endpoint& local) {
+      const net::TcpListener listener(loop, local, [](net::Connection) {});
+    }));
+    add(portFree("UDP", port, [](net::Loop& loop, const net::Endpoint& local) {
+      const net::UdpSocket socket(loop, local);
+    }));
+  }
+  void findDevices() {
+    title("devices");
+    devices_ = device::findDevices();
+    if (!json_) printDevices(devices_);
+  }
+  void examineLoop(double seconds) {
+    title("loop, " + shortNumber(seconds) + " s at 1 kHz with the simulated hand");
+    loop_ = measureLoop(seconds);
+    for (const std::string& line : loop_.setup) title("        " + line);
+    add(steadiness(loop_, realtimeGranted_));
+  }
+  void examineIsolation(double seconds) {
+    title("a driver in its own process (--isolate), " + shortNumber(seconds) + " s");
+    add(isolation(seconds, realtimeGranted_));
+  }
+
+  // Returns the exit status.
+  int conclude() const {
+    const auto bad = count(Verdict::bad);
+    if (json_) {
+      printAll(bad == 0);
+    } else if (bad == 0) {
+      const auto notes = count(Verdict::note);
+      std::printf("verdict: ready to render forces (%td %s above)\n", notes, notes == 1 ? "note" : "notes");
+    } else {
+      const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
+      std::printf("verdict: fix the %s marked -> above first; the simulated hand runs without\n",
+                  problems.c_str());
+    }
+    return bad == 0 ? 0 : 1;
+  }
+
+ private:
+  void title(const std::string& text) const {
+    if (json_) return;
+    std::printf("%s\n", text.c_str());
+    std::fflush(stdout);  // before a measurement
+  }
+  void add(const Finding& finding) {
+    if (!json_) print(finding);
+    findings_.push_back(finding);
+  }
+  std::ptrdiff_t count(Verdict verdict) const {
+    return std::count_if(findings_.begin(), findings_.end(),
+                         [&](const Finding& finding) { return finding.verdict == verdict; });
+  }
+  void printAll(bool ready) const {
     nlohmann::json checks = nlohmann::json::array();
-    for (const Finding& finding : findings) checks.push_back(findingJson(finding));
-    printJson({{"ready", bad == 0},
+    for (const Finding& finding : findings_) checks.push_back(findingJson(finding));
+    printJson({{"ready", ready},
                {"checks", checks},
-               {"devices", jsonOf(devices)},
+               {"devices", jsonOf(devices_)},
                {"loop",
-                {{"ticks", loop.ticks},
-                 {"overruns", loop.overruns},
-                 {"wakeup_p50_us", loop.wakeup_us.p50},
-                 {"wakeup_p99_us", loop.wakeup_us.p99},
-                 {"wakeup_max_us", loop.wakeup_us.max},
-                 {"compute_p99_us", loop.compute_us.p99}}}});
-  } else if (bad == 0) {
-    std::printf("verdict: ready to render forces (%d %s above)\n", notes, notes == 1 ? "note" : "notes");
-  } else {
-    const std::string problems = bad == 1 ? "problem" : std::to_string(bad) + " problems";
-    std::printf("verdict: fix the %s marked -> above first; the simulated hand runs without\n",
-                problems.c_str());
+                {{"ticks", loop_.ticks},
+                 {"overruns", loop_.overruns},
+                 {"wakeup_p50_us", loop_.wakeup_us.p50},
+                 {"wakeup_p99_us", loop_.wakeup_us.p99},
+                 {"wakeup_max_us", loop_.wakeup_us.max},
+                 {"compute_p99_us", loop_.compute_us.p99}}}});
   }
-  return bad == 0 ? 0 : 1;
+
+  const bool json_;
+  bool realtimeGranted_ = false;
+  std::vector<Finding> findings_;
+  std::vector<device::DriverReport> devices_;
+  LoopCheck loop_;
+};
+
+int run(double seconds, std::uint16_t port, bool json) {
+  Examination examination(json);
+  examination.examineSystem();
+  examination.examinePorts(port);
+  examination.findDevices();
+  examination.examineLoop(seconds);
+  examination.examineIsolation(seconds);
+  return examination.conclude();
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -78,6 +79,9 @@ bool explainMissingCommand(const CLI::App& app, const CLI::ParseError& error) {
   return true;
 }
 
+// How CLI11's text on a flag with a value ends; it begins with the name, without hyphens.
+constexpr std::string_view kFlagWithValue = " was given a disallowed flag override";
+
 // CLI11's own texts name neither the command nor, for some errors, what to do.
 std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
   const std::string text = error.what();
@@ -89,6 +93,8 @@ std::string textOf(const CLI::App& app, const CLI::ParseError& error) {
     return "unexpected argument '" + extra + "'" + (isConfig ? "; use '--config " + extra + "'" : "");
   }
   if (code != CLI::ExitCodes::ArgumentMismatch) return text;
+  if (text.ends_with(kFlagWithValue))
+    return "--" + text.substr(0, text.size() - kFlagWithValue.size()) + " takes no value";
   const std::string option = text.substr(0, text.find(':'));
   return option + (text.ends_with("missing") ? " needs a value" : " is given more than once");
 }
@@ -129,6 +135,14 @@ void giveThreadsStack() {
       pthread_attr_setstacksize(&attributes, kStack_bytes) == 0)
     pthread_setattr_default_np(&attributes);
   pthread_attr_destroy(&attributes);
+}
+
+// Otherwise "--force=no" and "--full=3" would be taken, and the value of some ignored.
+void refuseValuesOfFlags(CLI::App& app) {
+  for (CLI::Option* option : app.get_options([](const CLI::Option*) { return true; }))
+    if (option->get_items_expected_max() == 0) option->disable_flag_override();
+  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    refuseValuesOfFlags(*command);
 }
 
 // The words in the order in which CLI11 takes them: the last first. "help COMMAND" is "COMMAND --help".
@@ -180,6 +194,7 @@ int main(int argc, char** argv) {
   addBench(app);
   addManual(app);
   addDeviceHost(app);
+  refuseValuesOfFlags(app);
   try {
     app.parse(wordsOf(argc, argv));
   } catch (const CLI::ParseError& error) {

@@ -167,7 +167,7 @@ class ServerRecording {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
       const std::string heard = base::printable(text->text.text);
-      if (text->severity == wire::kTextError && isAboutRecording(heard)) refusal_ = heard;
+      if (text->severity == wire::kTextError && heard.starts_with("Recording_Control")) refusal_ = heard;
       if (text->severity == wire::kTextWarning && heard.starts_with(kRecordingTo))
         std::fprintf(stderr, "hapticd record: %s\n", heard.c_str());
       const bool answers = heard.starts_with(kRecordingTo) || heard.starts_with(kRecorded);
@@ -177,11 +177,6 @@ class ServerRecording {
   }
 
  private:
-  // A refusal for the role of the client begins with the name of the message.
-  static bool isAboutRecording(std::string_view text) {
-    return text.starts_with("Recording_Control") || text.starts_with(wire::RecordingControl::kInfo.name);
-  }
-
   const std::string server_;
   const client::DeviceAddress address_;
   client::Link link_;

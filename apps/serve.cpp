@@ -249,6 +249,59 @@ int run(const ServeOptions& options) {
   return 0;
 }
 
+// `options` must live as long as `command`.
+void addNetworkOptions(CLI::App& command, ServeOptions& options) {
+  command
+      .add_option("--listen", options.listen,
+                  "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks")
+      ->check(notEmpty());
+  command.add_option("--port", options.port, "Only the port; 0: any free one")
+      ->check(withinIntegers(0, 65535));
+  command
+      .add_option("--http", options.http,
+                  "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
+                  "none]; 'off' for none; 0.0.0.0:8080 for all networks")
+      ->check(notEmpty());
+  command.add_option("--http-allow", options.httpAllow,
+                     "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
+                     "IP addresses and localhost are always allowed");
+  command.add_flag(
+      "--insecure", options.insecure,
+      "Let other machines in without encryption: everybody who reaches the port can move the arm");
+}
+
+// The same.
+void addDeviceOptions(CLI::App& command, ServeOptions& options) {
+  command.add_option("--name", options.names,
+                     "Device name that clients open [Phantom]; repeat it for more names");
+  command
+      .add_option("--device", options.driver,
+                  "Driver [simulated]: " + device::driverNames() +
+                      "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5")
+      ->check(notEmpty());
+  command.add_flag("--enable-forces", options.enableForces,
+                   "Enable forces on a real device; without this flag it starts disarmed");
+  command.add_flag("--calibrate", options.calibrate,
+                   "Consent to calibration at the start and at a re-arm after it was lost; MAY MOVE THE ARM");
+  CLI::Option* const isolate = command.add_flag(
+      "--isolate", options.isolate,
+      "Run the driver in its own process: a crash is then a fault, not the end of the server, and that\n"
+      "process ends the force when the server hangs or dies. Default for openhaptics, which has no watchdog");
+  command
+      .add_flag("--in-process", options.inProcess,
+                "Run the driver in the server's process: saves one tick of delay and that protection")
+      ->excludes(isolate);
+  command
+      .add_option(
+          "--hand", options.hand,
+          "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
+          "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one")
+      ->check(notEmpty());
+  command.add_flag(
+      "--allow-no-rt", options.allowNoRealtime,
+      "Run a real device even if the system refuses realtime rights; the simulated hand always runs");
+}
+
 }  // namespace
 
 void addServe(CLI::App& app) {
@@ -260,46 +313,8 @@ void addServe(CLI::App& app) {
       ->check(existingFile());
   command->add_flag("--check-config", options->checkConfig,
                     "Print the configuration in effect as TOML, or the error in it, and exit");
-  command
-      ->add_option("--listen", options->listen,
-                   "ADDR:PORT for TCP and UDP [127.0.0.1:3883]; 0.0.0.0 for all networks")
-      ->check(notEmpty());
-  command->add_option("--port", options->port, "Only the port; 0: any free one")
-      ->check(withinIntegers(0, 65535));
-  command
-      ->add_option("--http", options->http,
-                   "ADDR:PORT of the viewer, its data and the metrics [127.0.0.1:8080 if free, otherwise\n"
-                   "none]; 'off' for none; 0.0.0.0:8080 for all networks")
-      ->check(notEmpty());
-  command->add_option("--http-allow", options->httpAllow,
-                      "HOST or HOST:PORT by which browsers may open the viewer; repeat it for more.\n"
-                      "IP addresses and localhost are always allowed");
-  command->add_option("--name", options->names,
-                      "Device name that clients open [Phantom]; repeat it for more names");
-  command
-      ->add_option("--device", options->driver,
-                   "Driver [simulated]: " + device::driverNames() +
-                       "\nDRIVER:WHICH selects one of several devices, e.g. evdev:/dev/input/event5")
-      ->check(notEmpty());
-  command->add_flag("--enable-forces", options->enableForces,
-                    "Enable forces on a real device; without this flag it starts disarmed");
-  command->add_flag(
-      "--calibrate", options->calibrate,
-      "Consent to calibration at the start and at a re-arm after it was lost; MAY MOVE THE ARM");
-  CLI::Option* const isolate = command->add_flag(
-      "--isolate", options->isolate,
-      "Run the driver in its own process: a crash is then a fault, not the end of the server, and that\n"
-      "process ends the force when the server hangs or dies. Default for openhaptics, which has no watchdog");
-  command
-      ->add_flag("--in-process", options->inProcess,
-                 "Run the driver in the server's process: saves one tick of delay and that protection")
-      ->excludes(isolate);
-  command
-      ->add_option(
-          "--hand", options->hand,
-          "Simulated device: 'script' strokes the objects of the scene [script], FILE.csv follows the path\n"
-          "t_s,x_m,y_m,z_m[,qx,qy,qz,qw][,buttons], FILE.traj a measured one")
-      ->check(notEmpty());
+  addNetworkOptions(*command, *options);
+  addDeviceOptions(*command, *options);
   command->add_option("--report-rate", options->reportRate_Hz, "Reports per second [1000]")
       ->check(within(0.1, 4000));
   command->add_option("--seconds", options->seconds, "Stop after this time; 0: run until a signal [0]")
@@ -310,12 +325,6 @@ void addServe(CLI::App& app) {
           "Write a recording (all scene commands and ticks) for replay, render and export; %Y%m%d-%H%M%S\n"
           "in the name becomes the time")
       ->check(notEmpty());
-  command->add_flag(
-      "--allow-no-rt", options->allowNoRealtime,
-      "Run a real device even if the system refuses realtime rights; the simulated hand always runs");
-  command->add_flag(
-      "--insecure", options->insecure,
-      "Let other machines in without encryption: everybody who reaches the port can move the arm");
   command->add_flag("-v,--verbose", options->verbose, "Log more");
   command->footer(
       "Clients open NAME@HOST, NAME@HOST:PORT or NAME@tcp://HOST:PORT as Tracker, Button or ForceDevice.\n"

@@ -141,103 +141,134 @@ tls::Context contextOf(const TunnelOptions& options, const std::string& host) {
       "--ca with the authority that signed its certificate");
 }
 
-// A connection to the server, from behind the tunnel.
-using Connect = std::function<net::Connection()>;
+// The server at the far end: through TLS, or a Unix socket of this machine.
+class FarEnd {
+ public:
+  // Throws when the server does not answer: a wrong fingerprint is told here and not to the first client.
+  FarEnd(net::Loop& loop, const TunnelOptions& options, const net::ConnectionOptions& link)
+      : loop_(loop), server_(client::parseServer(options.server)), link_(link) {
+    if (server_.socket.empty()) {
+      context_ = contextOf(options, server_.host);
+      host_.emplace(server_.host);
+      tryOnce();
+      return;
+    }
+    if (!(options.fingerprint + options.authorities).empty())
+      throw std::runtime_error(name() + " is a socket of this machine, without TLS: leave out " +
+                               (options.fingerprint.empty() ? "--ca" : "--fingerprint"));
+    connect();
+  }
 
-// A wrong fingerprint is told here and not to the first client. Throws when the server does not answer.
-void tryOnce(net::Loop& loop, const Connect& connect, const std::string& server) {
-  bool answered = false;
-  std::optional<std::string> failure;
-  net::Connection connection = connect();
-  connection.start({.onConnected = [&] { answered = true; },
-                    .onBytes = [](auto) {},
-                    .onDrained = {},
-                    .onPeerGone = {},
-                    .onClosed = [&](const std::string& why) { failure = why; }});
-  const auto end = std::chrono::steady_clock::now() + 5s;
-  while (!answered && !failure && std::chrono::steady_clock::now() < end) loop.runOnce(100ms);
-  if (!answered) throw ConnectError(server + ": " + failure.value_or("no TLS handshake within 5 s"));
-}
+  // Throws net::Error when there is no such Unix socket.
+  net::Connection connect() {
+    if (!context_) return net::connectLocal(loop_, server_.socket, link_);
+    const net::Endpoint address{host_->address(), server_.port};
+    host_->askAgain();  // a client that fails tries again, then with the answer
+    return tls::wrap(*context_, net::Connection::connect(loop_, address, 3s, link_));
+  }
+  std::string name() const { return server_.text(); }
+
+ private:
+  void tryOnce() {
+    bool answered = false;
+    std::optional<std::string> failure;
+    net::Connection connection = connect();
+    connection.start({.onConnected = [&] { answered = true; },
+                      .onBytes = [](auto) {},
+                      .onDrained = {},
+                      .onPeerGone = {},
+                      .onClosed = [&](const std::string& why) { failure = why; }});
+    const auto end = std::chrono::steady_clock::now() + 5s;
+    while (!answered && !failure && std::chrono::steady_clock::now() < end) loop_.runOnce(100ms);
+    if (!answered) throw ConnectError(name() + ": " + failure.value_or("no TLS handshake within 5 s"));
+  }
+
+  net::Loop& loop_;
+  const client::ServerAddress server_;
+  const net::ConnectionOptions link_;
+  std::optional<tls::Context> context_;
+  std::optional<client::HostLookup> host_;
+};
+
+// The local port, with a Carrier for each client.
+class Tunnel {
+ public:
+  explicit Tunnel(const TunnelOptions& options)
+      : token_(options.tokenFile.empty() ? net::Buffer() : identification(readToken(options.tokenFile))),
+        farEnd_(loop_, options, kLink),
+        listener_(
+            loop_, {net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)},
+            [this](net::Connection near) { carry(std::move(near)); }, kLink, "--port"),
+        requests_(loop_, listener_.local()) {
+    requests_.start(
+        {.onDatagram = [this](auto, const net::Endpoint& from) { refuseCallBack(from); }, .onRefused = {}});
+  }
+
+  void run() {
+    std::printf("clients open NAME@tcp://%s; connections go to %s\n", listener_.local().text().c_str(),
+                farEnd_.name().c_str());
+    std::fflush(stdout);
+    auto reportedAt = std::chrono::steady_clock::now();
+    while (!stopRequested()) {
+      loop_.runOnce(200ms);
+      const auto now = std::chrono::steady_clock::now();
+      if (now - reportedAt < 1s) continue;
+      reportedAt = now;
+      log_.reportSuppressed();
+    }
+    for (const std::shared_ptr<Carrier>& carrier : std::list(carriers_)) carrier->end("the tunnel ends");
+    loop_.runOnce(0ms);  // forgets them
+  }
+
+ private:
+  static constexpr net::ConnectionOptions kLink{
+      .keepAlive = 1s,
+      .closeTimeout = 24h,  // as long as the peer takes what is queued: nobody waits for it
+  };
+
+  void carry(net::Connection near) {
+    net::Connection far;
+    try {
+      far = farEnd_.connect();
+    } catch (const net::Error& error) {  // the Unix socket is gone
+      return tell(error.what());
+    }
+    carriers_.emplace_back();
+    const auto place = std::prev(carriers_.end());
+    *place = std::make_shared<Carrier>(std::move(near), std::move(far), token_,
+                                       [this, place](const std::string& why) {
+                                         tell(why);
+                                         // After its last callback, and with time to send what is queued.
+                                         loop_.post([this, place] { carriers_.erase(place); });
+                                       });
+    (*place)->start();
+  }
+
+  void tell(const std::string& why) { log_.warnOfLasting("client disconnected: " + why); }
+
+  void refuseCallBack(const net::Endpoint& from) {
+    if (std::exchange(toldOfCallBack_, true)) return;
+    std::fprintf(stderr,
+                 "hapticd: %s asks for a call-back: the tunnel carries tcp:// only, open NAME@tcp://%s\n",
+                 from.text().c_str(), listener_.local().text().c_str());
+  }
+
+  server::ThrottledLog log_;  // a client tries again while the server cannot be reached
+  const net::Buffer token_;
+  net::Loop loop_;
+  FarEnd farEnd_;
+  std::list<std::shared_ptr<Carrier>> carriers_;
+  net::TcpListener listener_;
+  net::UdpSocket requests_;
+  bool toldOfCallBack_ = false;
+};
 
 int run(const TunnelOptions& options) {
   spdlog::set_default_logger(spdlog::stderr_logger_st("tunnel"));
   spdlog::set_pattern("hapticd: %v");
-  server::ThrottledLog log;  // a client tries again while the server cannot be reached
-  const client::ServerAddress server = client::parseServer(options.server);
-  net::Loop loop;
-  std::optional<tls::Context> context;
-  std::optional<client::HostLookup> host;
-  if (!server.socket.empty() && !(options.fingerprint + options.authorities).empty())
-    throw std::runtime_error(server.text() + " is a socket of this machine, without TLS: leave out " +
-                             (options.fingerprint.empty() ? "--ca" : "--fingerprint"));
-  if (server.socket.empty()) {
-    context = contextOf(options, server.host);
-    host.emplace(server.host);
-  }
-  const net::Buffer token =
-      options.tokenFile.empty() ? net::Buffer() : identification(readToken(options.tokenFile));
-  std::list<std::shared_ptr<Carrier>> carriers;
-  net::ConnectionOptions link;
-  link.keepAlive = 1s;
-  link.closeTimeout = 24h;  // as long as the peer takes what is queued: nobody waits for it
-  const net::Endpoint local{net::kLoopbackAddress, static_cast<std::uint16_t>(options.port)};
-  const auto tell = [&log](const std::string& why) { log.warnOfLasting("client disconnected: " + why); };
-  const Connect connect = [&] {
-    if (!context) return net::connectLocal(loop, server.socket, link);
-    const net::Endpoint address{host->address(), server.port};
-    host->askAgain();  // a client that fails tries again, then with the answer
-    return tls::wrap(*context, net::Connection::connect(loop, address, 3s, link));
-  };
-  if (context) {
-    tryOnce(loop, connect, server.text());
-  } else {
-    net::connectLocal(loop, server.socket, link);  // throws
-  }
-  net::TcpListener listener(
-      loop, local,
-      [&](net::Connection near) {
-        net::Connection far;
-        try {
-          far = connect();
-        } catch (const net::Error& error) {  // the Unix socket is gone
-          return tell(error.what());
-        }
-        carriers.emplace_back();
-        const auto place = std::prev(carriers.end());
-        *place = std::make_shared<Carrier>(std::move(near), std::move(far), token,
-                                           [&loop, &carriers, &tell, place](const std::string& why) {
-                                             tell(why);
-                                             // After its last callback, and with time to send what is queued.
-                                             loop.post([&carriers, place] { carriers.erase(place); });
-                                           });
-        (*place)->start();
-      },
-      link, "--port");
-  net::UdpSocket requests(loop, listener.local());
-  const std::string at = listener.local().text();
-  bool told = false;
-  requests.start({.onDatagram =
-                      [&](auto, const net::Endpoint& from) {
-                        if (std::exchange(told, true)) return;
-                        std::fprintf(stderr,
-                                     "hapticd: %s asks for a call-back: the tunnel carries tcp:// only, open "
-                                     "NAME@tcp://%s\n",
-                                     from.text().c_str(), at.c_str());
-                      },
-                  .onRefused = {}});
+  Tunnel tunnel(options);
   const StopSignals signals;
-  std::printf("clients open NAME@tcp://%s; connections go to %s\n", at.c_str(), server.text().c_str());
-  std::fflush(stdout);
-  auto reportedAt = std::chrono::steady_clock::now();
-  while (!stopRequested()) {
-    loop.runOnce(200ms);
-    const auto now = std::chrono::steady_clock::now();
-    if (now - reportedAt < 1s) continue;
-    reportedAt = now;
-    log.reportSuppressed();
-  }
-  for (const std::shared_ptr<Carrier>& carrier : std::list(carriers)) carrier->end("the tunnel ends");
-  loop.runOnce(0ms);  // forgets them
+  tunnel.run();
   return 0;
 }
 

@@ -14,20 +14,11 @@
 #include <vector>
 
 #include "bench/helpers.h"
+#include "bench/options.h"
 #include "bench/report.h"
 
 namespace hapticd::bench {
 namespace {
-
-struct Options {
-  std::vector<std::string> names;
-  bool full = false;
-  bool longest = false;
-  bool list = false;
-  bool json = false;
-  std::string out;
-  std::vector<std::string> helper;
-};
 
 std::vector<const Benchmark*> chosen(const std::vector<std::string>& names) {
   std::vector<const Benchmark*> result;
@@ -68,7 +59,6 @@ void write(const std::filesystem::path& directory, const std::vector<Measured>& 
 }
 
 int run(const Options& options) {
-  if (!options.helper.empty()) return runHelper(options.helper);
   if (options.list && options.json) {
     nlohmann::json list = nlohmann::json::array();
     for (const Benchmark& b : benchmarks()) list.push_back({{"name", b.name}, {"what", b.what}});
@@ -109,33 +99,16 @@ int run(const Options& options) {
   return std::max(status, printed());
 }
 
-void declare(CLI::App& app, Options& options) {
-  app.name("hapticd bench");
-  app.add_option("names", options.names, "Benchmarks to run [all of them]");
-  CLI::Option* const list = app.add_flag("--list", options.list, "List the benchmarks and exit");
-  app.add_flag("--json", options.json, "With --list: as JSON")->needs(list);
-  app.add_flag("--full", options.full,
-               "Longer measurements, about 25 minutes in all [windows of some seconds]");
-  app.add_flag("--long", options.longest, "The longest measurements, about an hour");
-  app.add_option("--out", options.out, "Directory for results.json, results.csv, results.md and drawings");
-  app.add_option("--helper", options.helper, "A process that the suite starts for itself")->group("");
-  app.footer(
-      "Ratios decide; microseconds are for reference, because they differ between machines.\n"
-      "Stop other work first; 'hapticd doctor' explains how to get realtime rights.\n"
-      "Examples:\n"
-      "  hapticd bench                     all of them, in under ten minutes\n"
-      "  hapticd bench tick deform         two of them\n"
-      "  hapticd bench --full --out out/   results to keep");
-}
-
 }  // namespace
 }  // namespace hapticd::bench
 
 int main(int argc, char** argv) {
   using namespace hapticd::bench;
-  CLI::App app{"Measure how fast hapticd is, against yardsticks on this machine"};
+  CLI::App app{kSummary, "hapticd bench"};
   Options options;
   declare(app, options);
+  std::vector<std::string> helper;
+  app.add_option("--helper", helper, "A process that the suite starts for itself")->group("");
   try {
     try {
       app.parse(argc, argv);
@@ -143,7 +116,7 @@ int main(int argc, char** argv) {
       app.exit(help);
       return printed();
     }
-    return run(options);
+    return helper.empty() ? run(options) : runHelper(helper);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "hapticd bench: %s; 'hapticd bench --help' lists the options\n", error.what());
     return 2;

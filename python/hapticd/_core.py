@@ -89,7 +89,7 @@ class Subscription(Generic[Report]):
 
     def __init__(self, callbacks: "List[Subscription[Any]]", callback: Callable[[Report], object]) -> None:
         self._callbacks = callbacks
-        self.callback = callback
+        self._callback = callback
         self.active = True
         callbacks.append(self)
 
@@ -302,7 +302,7 @@ class Core(Commands):
     _ELSEWHERE = ""  # what a call from another place is told
 
     def __init__(self, address: Address, options: Options) -> None:
-        self.options = options
+        self._options = options
         #: NAME of the device.
         self.device: Final = address.device
         #: HOST:PORT of the server.
@@ -420,7 +420,7 @@ class Core(Commands):
 
     # --- the peer reports
 
-    def peer_connected(self) -> None:
+    def _peer_connected(self) -> None:
         """Servers answer in order. The question for the capabilities precedes the ping, so a pong without
         capabilities before it means that the server does not know the question."""
         assert self._peer is not None
@@ -442,19 +442,19 @@ class Core(Commands):
         self._ping()  # also when a report arrives first: its pong answers the question for the capabilities
         self._ping_at = time.monotonic() + PING_S
 
-    def peer_described(self, sender: str) -> None:
+    def _peer_described(self, sender: str) -> None:
         # Stock servers describe our own name back to us; that is no evidence of a device.
         if sender not in (self.device, "VRPN Control"):
             self._server_devices.append(sender)
 
-    def peer_listens(self, host: str, port: int) -> None:
+    def _peer_listens(self, host: str, port: int) -> None:
         parts = host.split(".")
         if len(parts) == 4 and all(p.isdigit() and int(p) < 256 for p in parts) and 1 <= port <= 65535:
             self._udp_target = (host, port)
             assert self._peer is not None
             self._peer.use_datagrams = True
 
-    def peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
+    def _peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
         self._counts.messages_in += 1
         if sender != self.device:
             return
@@ -553,14 +553,14 @@ class Core(Commands):
         for subscription in tuple(self._callbacks[name]):
             if subscription.active:
                 try:
-                    subscription.callback(report)
+                    subscription._callback(report)
                 except Exception as error:
                     failure = failure or error
         if failure is not None:
             raise failure
 
     def _raise_first_error(self) -> None:
-        if self.options.throw_on_error and self._first_error:
+        if self._options.throw_on_error and self._first_error:
             text, self._first_error = self._first_error, ""
             raise ServerError(f"{self.device}@{self.server}: {text}")
 
@@ -599,7 +599,7 @@ class Core(Commands):
             self._peer.stream.extend(frames)
             self._peer.stream_bytes += size
         elif self._counts.connections == 0:
-            if self._backlog_bytes + size > max(self.options.queue_limit_bytes, BATCH_BYTES):
+            if self._backlog_bytes + size > max(self._options.queue_limit_bytes, BATCH_BYTES):
                 raise ConnectError(f"{self._why_not_connected()}; {self._backlog_bytes + size} bytes wait to be sent")
             self._backlog.extend(frames)
             self._backlog_bytes += size
@@ -651,7 +651,7 @@ class Core(Commands):
 
     def _check_renewed(self) -> None:
         """Raises ConnectionLost when the connection has ended and no other will follow."""
-        if not self.connected and self._counts.connections and not self.options.reconnect:
+        if not self.connected and self._counts.connections and not self._options.reconnect:
             raise ConnectionLost(f"connection to {self.server} lost: {self._why_not_connected()}")
 
     def _check_kept(self, connection: int) -> None:
@@ -662,7 +662,7 @@ class Core(Commands):
             raise ConnectionLost(f"connection to {self.server} lost while sending: {self._last_failure}")
 
     def _not_acknowledged(self) -> str:
-        return f"{self.server} acknowledged nothing for {self.options.send_timeout:g} s"
+        return f"{self.server} acknowledged nothing for {self._options.send_timeout:g} s"
 
     def _why_not_connected(self) -> str:
         server, failure = self.server, self._last_failure

@@ -29,16 +29,16 @@ class ProtocolError(Exception):
 class Handler(Protocol):
     """Receives what a peer reads."""
 
-    def peer_connected(self) -> None:
+    def _peer_connected(self) -> None:
         """The peer's cookie is valid; messages can be sent from now on."""
 
-    def peer_described(self, sender: str) -> None:
+    def _peer_described(self, sender: str) -> None:
         """The peer has a device of this name."""
 
-    def peer_listens(self, host: str, port: int) -> None:
+    def _peer_listens(self, host: str, port: int) -> None:
         """The peer takes datagrams there."""
 
-    def peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
+    def _peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
         """A message; its kind is the position in the table, or UNKNOWN."""
 
 
@@ -96,7 +96,7 @@ class Peer:
     def _read_frames(self, data: bytes, at: int, datagram: bool) -> int:
         unpack = HEADER.unpack_from
         end = len(data)
-        types, senders, message = self._their_types, self._their_senders, self._handler.peer_message
+        types, senders, message = self._their_types, self._their_senders, self._handler._peer_message
         while end - at >= HEADER_BYTES:
             length, seconds, microseconds, sender, type_, _ = unpack(data, at)
             if not HEADER_BYTES <= length <= MAX_FRAME_BYTES:
@@ -129,7 +129,7 @@ class Peer:
             self.send_frames(frame(seconds, microseconds, number, _SENDER, _description(name.encode())))
         for number, name in enumerate(TYPE_NAMES):
             self.send_frames(frame(seconds, microseconds, number, _TYPE, _description(name.encode())))
-        self._handler.peer_connected()
+        self._handler._peer_connected()
 
     def _read_system(self, type_: int, sender: int, payload: bytes) -> None:
         if type_ in (_SENDER, _TYPE):
@@ -143,12 +143,12 @@ class Peer:
             name = payload[4 : 4 + length].split(b"\0", 1)[0]
             if type_ == _SENDER:
                 self._their_senders[sender] = name.decode("utf-8", "replace")
-                self._handler.peer_described(self._their_senders[sender])
+                self._handler._peer_described(self._their_senders[sender])
             else:
                 self._their_types[sender] = _NUMBER_OF.get(name, UNKNOWN)
         elif type_ == _UDP:
             if self._udp is not None:
-                self._handler.peer_listens(payload.split(b"\0", 1)[0].decode("latin-1"), sender)
+                self._handler._peer_listens(payload.split(b"\0", 1)[0].decode("latin-1"), sender)
         elif type_ <= _LOWEST_TYPE:
             raise ProtocolError(f"message of type {type_}, the lowest is {_LOWEST_TYPE + 1}")
 

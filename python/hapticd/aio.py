@@ -50,9 +50,11 @@ from ._core import (
     options_of,
 )
 from ._peer import ProtocolError
-from .client import LossWatch, has_ended, unacknowledged
+from ._tcp import LossWatch, has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
+
+__all__ = ["Client", "connect"]
 
 
 #: The batches that this task is in: its own, and those in which it was made.
@@ -131,7 +133,7 @@ async def _stay_connected(reference: "weakref.ref[Client]") -> None:
         if lost is not None:
             await lost.wait()
         client = reference()
-        if client is None or client._finished or (client._counts.connections and not client.options.reconnect):
+        if client is None or client._finished or (client._counts.connections and not client._options.reconnect):
             return
         client._host.ask_again()
         del client
@@ -276,9 +278,9 @@ class Client(Core):
         self._host = await self._loop.run_in_executor(None, HostLookup, self._address)
         self._target = self._host.target  # of the attempt
         self._task = self._loop.create_task(_stay_connected(weakref.ref(self)))
-        if self.options.connect_timeout > 0:
+        if self._options.connect_timeout > 0:
             try:
-                await self.wait_connected(self.options.connect_timeout)
+                await self.wait_connected(self._options.connect_timeout)
             except BaseException:
                 await self.close()
                 raise
@@ -313,7 +315,7 @@ class Client(Core):
             if running is not None:
                 running.cancel()
         if transport is not None:
-            await _end_stream(transport, self.options.send_timeout, longest)
+            await _end_stream(transport, self._options.send_timeout, longest)
             await asyncio.sleep(0)  # the transport closes its socket in the next turn
         if self._task is not None:
             await asyncio.wait([self._task])
@@ -329,7 +331,7 @@ class Client(Core):
         if hasattr(self, "_task") and not self._finished:
             with suppress(RuntimeError):  # the event loop has been closed, and its sockets with it
                 self._loop.call_soon_threadsafe(
-                    _end, self._transport, self.options.send_timeout, self._udp, self._timer, self._task
+                    _end, self._transport, self._options.send_timeout, self._udp, self._timer, self._task
                 )
 
     def _leave_to_parent(self) -> None:
@@ -353,7 +355,7 @@ class Client(Core):
             return
         self._transport = transport
         with suppress(OSError):  # the server has ended it already
-            self._loss = LossWatch(transport.get_extra_info("socket"), self.options.send_timeout)
+            self._loss = LossWatch(transport.get_extra_info("socket"), self._options.send_timeout)
         self._remote = str(transport.get_extra_info("peername")[0])
         if not reverse:
             self._begin(None)
@@ -460,8 +462,8 @@ class Client(Core):
         self._push()
         self._timer = self._loop.call_later(max(0.0, at - time.monotonic()), _turn_of, weakref.ref(self))
 
-    def peer_connected(self) -> None:
-        super().peer_connected()
+    def _peer_connected(self) -> None:
+        super()._peer_connected()
         self._loop.call_soon(self._turn)
 
     async def _wait(self, condition: Callable[[], bool], timeout: float) -> bool:
@@ -498,8 +500,8 @@ class Client(Core):
 
     async def _wait_answer(self) -> None:
         if not self.connected:
-            await self.wait_connected(self.options.connect_timeout)
-        await self._wait(lambda: self._answered or not self.connected, max(self.options.connect_timeout, 1.0))
+            await self.wait_connected(self._options.connect_timeout)
+        await self._wait(lambda: self._answered or not self.connected, max(self._options.connect_timeout, 1.0))
 
     async def _require(self, feature: int, what: str) -> None:
         await self._wait_answer()
@@ -575,9 +577,9 @@ class Client(Core):
                     waiting = transport.get_write_buffer_size()
                     if waiting < left:
                         left, progress = waiting, self._loop.time()
-                    elif self._loop.time() - progress > self.options.send_timeout:
+                    elif self._loop.time() - progress > self._options.send_timeout:
                         self._abort(
-                            f"{self.server} accepted no data for {self.options.send_timeout:g} s; {waiting} bytes wait to "
+                            f"{self.server} accepted no data for {self._options.send_timeout:g} s; {waiting} bytes wait to "
                             "be sent"
                         )
         self._check_kept(connection)
@@ -741,7 +743,7 @@ class Client(Core):
             raise ConnectionLost(f"{failure}: {self._why_not_connected()}")
 
     async def _stop_beside(self, backlog: int) -> None:
-        timeout = max(self.options.connect_timeout, 1.0)
+        timeout = max(self._options.connect_timeout, 1.0)
         options = Options(connect_timeout=0, reconnect=False, send_timeout=END_S)
         deadline = self._loop.time() + timeout
         async with connect(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:

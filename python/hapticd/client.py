@@ -8,11 +8,8 @@
 """
 
 import os
-import select
 import selectors
 import socket
-import struct
-import sys
 import threading
 import time
 from collections import deque
@@ -24,7 +21,7 @@ import numpy.typing as npt
 
 from . import _messages as m
 from . import reports as r
-from ._address import Address, HostLookup, local_towards, parse
+from ._address import HostLookup, local_towards, parse
 from ._codec import Numbers
 from ._commands import function
 from ._core import (
@@ -46,79 +43,16 @@ from ._core import (
     options_of,
 )
 from ._peer import ProtocolError
+from ._tcp import LossWatch, has_ended, unacknowledged
 from .errors import ConnectError, ConnectionLost
 from .scene import Capabilities, RemoteContact, Reports
 
+__all__ = ["Client", "connect"]
+
 _RECEIVE_BYTES = 1 << 20
-#: Options of the system's probes: macOS has another name for the first, and systems may lack some.
-_PROBES = ((("TCP_KEEPIDLE", "TCP_KEEPALIVE"), 5), (("TCP_KEEPINTVL",), 5), (("TCP_KEEPCNT",), 3))
-_LOSS_CHECK_S = 0.5
-#: Of Linux's tcp_info: tcpi_unacked, tcpi_last_data_recv and tcpi_last_ack_recv, and tcpi_snd_wnd (since Linux 5.4).
-_TCP_INFO = struct.Struct("=24xI24xII")
-_TCP_INFO_WINDOW = slice(228, 232)
 #: Ctrl-C while bytes are moved: how many were is not known, and what follows would not begin with a frame.
 _INTERRUPTED = "interrupted in the middle of a message"
 _CONNECT_PROGRESS = (10035, 36, 115, 11)  # WSAEWOULDBLOCK, EINPROGRESS (macOS, Linux), EAGAIN
-
-
-def unacknowledged(sock: socket.socket) -> int:
-    """Bytes of a TCP stream that the system has and the peer has not acknowledged; 0 where the system does not say."""
-    if sys.platform != "linux":
-        return 0
-    import fcntl
-    import termios
-
-    answer = fcntl.ioctl(sock.fileno(), termios.TIOCOUTQ, bytes(4))
-    return int.from_bytes(answer, sys.byteorder)
-
-
-def has_ended(sock: socket.socket) -> bool:
-    """Whether the peer has ended a TCP connection, even while data that it sent before waits to be read; false where
-    the system does not say."""
-    if sys.platform != "linux":
-        return False
-    waiting = select.poll()
-    waiting.register(sock.fileno(), select.POLLRDHUP)  # errors are reported in any case
-    return bool(waiting.poll(0))
-
-
-class LossWatch:
-    """Notices that the peer's machine is gone, or the way to it, as the C++ client does. The system probes an idle peer
-    after 5 s and ends the connection when three probes have no answer. While sent bytes wait for an acknowledgement it
-    does not probe, and itself waits for a quarter of an hour: where it says so (on Linux), the peer is lost when nothing
-    has come from it for the timeout. A peer whose program does not read still acknowledges, and is not lost; the timeout
-    of the system (TCP_USER_TIMEOUT) would end it."""
-
-    def __init__(self, sock: Any, timeout: float) -> None:
-        """Raises OSError."""
-        self._sock = sock
-        self._timeout = timeout
-        self._checked = time.monotonic()
-        self._waited: Optional[float] = None  # since an acknowledgement became due
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for names, value in _PROBES:
-            option = next((getattr(socket, name) for name in names if hasattr(socket, name)), None)
-            if option is not None:
-                sock.setsockopt(socket.IPPROTO_TCP, option, value)
-
-    def is_lost(self) -> bool:
-        """To be called at least every second. After a stall of this machine the answers are still in its queues, so the
-        time between two checks counts for two seconds at most."""
-        at = time.monotonic()
-        gap = at - self._checked
-        if sys.platform != "linux" or self._timeout <= 0 or gap < _LOSS_CHECK_S:
-            return False
-        self._checked = at
-        info = self._sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_WINDOW.stop)
-        in_flight, *heard_ms = _TCP_INFO.unpack_from(info)
-        closed = info[_TCP_INFO_WINDOW] == bytes(4)  # the peer takes no bytes at present
-        if not in_flight or closed:
-            self._waited = None
-        elif self._waited is None:
-            self._waited = 0.0
-        else:
-            self._waited = min(self._waited + min(gap, 2.0), min(heard_ms) / 1000)
-        return self._waited is not None and self._waited >= self._timeout
 
 
 class Client(Core):
@@ -214,7 +148,7 @@ class Client(Core):
         """Ends the stream behind what is collected, and discards what arrives until the server has ended its own: the
         system resets a connection that is closed with unread reports, and drops what it has not sent. Raises
         OSError."""
-        end = Ending(self.options.send_timeout, longest)
+        end = Ending(self._options.send_timeout, longest)
         ended = False
         with selectors.DefaultSelector() as waiting:
             waiting.register(sock, selectors.EVENT_READ | selectors.EVENT_WRITE)
@@ -339,7 +273,7 @@ class Client(Core):
         try:
             self._remote = str(self._sock.getpeername()[0])
             self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._loss = LossWatch(self._sock, self.options.send_timeout)
+            self._loss = LossWatch(self._sock, self._options.send_timeout)
         except OSError as error:  # the server has ended it already
             return self._fail(str(error))
         self._connecting = False
@@ -349,7 +283,7 @@ class Client(Core):
     def _fail(self, reason: str) -> None:
         self._drop_sockets()
         self._closed(reason)
-        if self._counts.connections == 0 or self.options.reconnect:
+        if self._counts.connections == 0 or self._options.reconnect:
             self._retry_at = time.monotonic() + RETRY_S
             self._host.ask_again()
 
@@ -523,8 +457,8 @@ class Client(Core):
         if self._uncounted < BATCH_BYTES:
             return
         self._push()
-        if self._out_bytes > max(self.options.queue_limit_bytes, 1):
-            self._drain_to(self.options.queue_limit_bytes // 2)
+        if self._out_bytes > max(self._options.queue_limit_bytes, 1):
+            self._drain_to(self._options.queue_limit_bytes // 2)
 
     def _drain_to(self, limit: int, on_step: Optional[Callable[[], object]] = None) -> None:
         connection = self._counts.connections
@@ -538,9 +472,9 @@ class Client(Core):
                 progress = time.monotonic()
                 if on_step is not None:
                     on_step()
-            elif time.monotonic() - progress > self.options.send_timeout:
+            elif time.monotonic() - progress > self._options.send_timeout:
                 why = (
-                    f"{self.server} accepted no data for {self.options.send_timeout:g} s; {self._out_bytes} bytes wait "
+                    f"{self.server} accepted no data for {self._options.send_timeout:g} s; {self._out_bytes} bytes wait "
                     "to be sent"
                 )
                 self._fail(why)
@@ -641,10 +575,10 @@ class Client(Core):
 
     def _wait_answer(self) -> None:
         if not self.connected:
-            self.wait_connected(self.options.connect_timeout)
+            self.wait_connected(self._options.connect_timeout)
         connection = self._counts.connections
         over = lambda: self._answered or not self.connected or self._counts.connections != connection  # noqa: E731
-        self._wait(over, max(self.options.connect_timeout, 1.0))
+        self._wait(over, max(self._options.connect_timeout, 1.0))
 
     def _require(self, feature: int, what: str) -> None:
         self._wait_answer()
@@ -780,7 +714,7 @@ class Client(Core):
 
     def _stop_beside(self, why: str, heartbeats: bool = True) -> None:
         """The server handles the messages of a connection in order, so the pong confirms the stop."""
-        timeout = max(self.options.connect_timeout, 1.0)
+        timeout = max(self._options.connect_timeout, 1.0)
         deadline = time.monotonic() + timeout
         options = Options(connect_timeout=0, reconnect=False, send_timeout=END_S)
         with Client(f"{self.device}@tcp://{self._target[0]}:{self._target[1]}", options) as beside:

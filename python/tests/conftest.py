@@ -202,16 +202,16 @@ class ScriptedServer:
         self.thread.start()
 
     # What Peer calls.
-    def peer_connected(self) -> None:
+    def _peer_connected(self) -> None:
         pass
 
-    def peer_described(self, sender: str) -> None:
+    def _peer_described(self, sender: str) -> None:
         pass
 
-    def peer_listens(self, host: str, port: int) -> None:
+    def _peer_listens(self, host: str, port: int) -> None:
         pass
 
-    def peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
+    def _peer_message(self, kind: int, sender: str, seconds: int, microseconds: int, payload: bytes) -> None:
         self.received.append((TYPE_NAMES[kind], payload))
         if kind == _NUMBERS[m.Ping][0]:
             self.send(m.Pong())
@@ -259,8 +259,8 @@ class Listener:
     def __init__(self) -> None:
         self.messages: List[Tuple[int, str, int, int, bytes]] = []
 
-    def peer_connected(self) -> None: ...
-    def peer_described(self, sender: str) -> None: ...
-    def peer_listens(self, host: str, port: int) -> None: ...
-    def peer_message(self, *message: Any) -> None:
+    def _peer_connected(self) -> None: ...
+    def _peer_described(self, sender: str) -> None: ...
+    def _peer_listens(self, host: str, port: int) -> None: ...
+    def _peer_message(self, *message: Any) -> None:
         self.messages.append(message)

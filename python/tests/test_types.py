@@ -1,5 +1,6 @@
 """mypy --strict, on the package and on a program that uses it as the documents show."""
 
+import asyncio
 import pathlib
 import re
 import subprocess
@@ -10,6 +11,12 @@ import hapticd
 PACKAGE = pathlib.Path(hapticd.__file__).parent
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs/python.md"
+#: What the modules show beyond the package: kinds and arrays of reports, and what a Session returns.
+MORE = {
+    "hapticd.reports": {"dtype_of", "rows_of"},
+    "hapticd.session": {"Command", "Lost", "Marker", "RecordedDevice", "Ticks"},
+    "hapticd.aio": {"Client", "connect"},
+}
 
 
 def mypy(tmp_path: pathlib.Path, *what: str) -> None:
@@ -39,6 +46,36 @@ def test_what_an_example_uploads_is_felt() -> None:
     assert sum(bool(objects) for objects, _, _ in uploads) >= 7
     for objects, surfaces, example in uploads:
         assert objects <= surfaces, example
+
+
+def test_a_client_has_the_calls_of_the_cplusplus_client_and_few_more() -> None:
+    calls = set(re.findall(r"\b([a-z]\w*)\(", (ROOT / "include/hapticd/client.h").read_text()))
+
+    async def asynchronous() -> "set[str]":
+        client = hapticd.aio.Client("Phantom@tcp://127.0.0.1:1", hapticd.Options(connect_timeout=0))
+        names = set(dir(client))
+        await client.close()
+        return names
+
+    with hapticd.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=0) as client:
+        both = set(dir(client)) | asyncio.run(asynchronous())
+    names = {name for name in both if not name.startswith("_")}
+    inherited = {name for name in names if re.sub(r"_(\w)", lambda part: part[1].upper(), name) in calls}
+    assert len(inherited) > 80
+    assert names - inherited == {"close", "collect", "on", "reports", "rows"}
+
+
+def test_modules_and_subscriptions_show_what_is_documented_only() -> None:
+    with hapticd.connect("Phantom@tcp://127.0.0.1:1", connect_timeout=0) as client:
+        subscription = client.on_force(print)
+    assert {name for name in dir(subscription) if not name.startswith("_")} == {"active", "end"}
+    assert {name for name in dir(hapticd) if not name.startswith("_")} - set(hapticd.__all__) == {
+        "client", "errors", "reports", "scene", "session"
+    }  # fmt: skip
+    for module in (hapticd.client, hapticd.aio, hapticd.errors, hapticd.reports, hapticd.scene, hapticd.session):
+        own = {name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__}
+        shown = {name for name in own if not name.startswith("_")}
+        assert shown <= set(hapticd.__all__) | MORE.get(module.__name__, set()), module.__name__
 
 
 def test_the_package_declares_its_types() -> None:

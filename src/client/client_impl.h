@@ -69,11 +69,18 @@ struct HAPTICD_HIDDEN Client::Impl {
   std::size_t poll(Duration timeout);
 
   void dispatch(const client::Arrival& arrival);
-  void dispatchMessage(const client::Arrival& arrival);
-  /// Decodes a payload, or counts it as damaged.
-  template <wire::WireMessage M, class Use>
-  void decode(const client::Arrival& arrival, Use&& use);
+  /// Ignores a message that is not among these.
+  template <class... M>
+  void dispatchMessage(const client::Arrival& arrival, wire::MessageList<M...> all);
+  /// Decodes a payload and handles it, or counts it as damaged.
+  template <wire::WireMessage M>
+  void decode(const client::Arrival& arrival);
+  template <wire::WireMessage M>
+  void handle(const client::Arrival& arrival, const M& message);
+  void handle(const client::Arrival& arrival, const wire::ButtonChange& change);
   void handle(const client::Arrival& arrival, const wire::ButtonStates& states);
+  void handle(const client::Arrival& arrival, const wire::Text& message);
+  void handle(const client::Arrival& arrival, const wire::HandState& state);
   /// Counts a report, keeps it as the latest, and calls back.
   template <class Report>
   void deliver(const client::Arrival& arrival, Report report);

@@ -70,6 +70,52 @@ void keep(LatestReports& latest, const HandReport& r) {
 template <class Other>
 void keep(LatestReports&, const Other&) {}
 
+PoseReport toReport(const wire::TrackerPosQuat& m) {
+  return {{}, m.sensor, m.position, m.orientation};
+}
+VelocityReport toReport(const wire::TrackerVelocity& m) {
+  return {{}, m.sensor, m.velocity, m.rotation, m.interval};
+}
+AccelerationReport toReport(const wire::TrackerAcceleration& m) {
+  return {{}, m.sensor, m.acceleration, m.rotation, m.interval};
+}
+ToRoomReport toReport(const wire::TrackerToRoom& m) {
+  return {{}, m.position, m.orientation};
+}
+UnitToSensorReport toReport(const wire::TrackerUnitToSensor& m) {
+  return {{}, m.sensor, m.position, m.orientation};
+}
+WorkspaceReport toReport(const wire::TrackerWorkspace& m) {
+  return {{}, m.min, m.max};
+}
+AnalogReport toReport(const wire::AnalogChannels& m) {
+  return {{}, m.channels.values};
+}
+ForceReport toReport(const wire::Force& m) {
+  return {{}, m.force};
+}
+TouchingReport toReport(const wire::IsTouching& m) {
+  return {{}, m.touching != 0};
+}
+DepthReport toReport(const wire::Dop& m) {
+  return {{}, m.depth};
+}
+ContactPointReport toReport(const wire::Scp& m) {
+  return {{}, m.position, m.orientation};
+}
+TouchedObjectReport toReport(const wire::TouchedObject& m) {
+  return {{}, m.object};
+}
+AngleReport toReport(const wire::Angle& m) {
+  return {{}, m.angle, m.touching != 0};
+}
+ForceErrorReport toReport(const wire::ForceError& m) {
+  return {{}, static_cast<hapticd::ForceError>(m.code)};
+}
+GuardReport toReport(const wire::GuardState& m) {
+  return {{}, Trips(m.active), Trips(m.latched), m.armed != 0, m.stopped != 0};
+}
+
 TickReport toReport(const wire::TickReport& m) {
   return {{},
           m.tick,
@@ -142,6 +188,15 @@ HandReport toReport(const wire::HandState& m) {
   return report;
 }
 
+// The others are pongs, and commands, which only servers handle.
+using MessagesForClients =
+    wire::MessageList<wire::TrackerPosQuat, wire::TrackerVelocity, wire::TrackerAcceleration,
+                      wire::TrackerToRoom, wire::TrackerUnitToSensor, wire::TrackerWorkspace,
+                      wire::ButtonChange, wire::ButtonStates, wire::AnalogChannels, wire::Force,
+                      wire::ForceError, wire::IsTouching, wire::Dop, wire::Scp, wire::TouchedObject,
+                      wire::Angle, wire::Text, wire::TickReport, wire::ContactList, wire::HandState,
+                      wire::GuardState>;
+
 }  // namespace
 
 template <class Report>
@@ -155,31 +210,14 @@ void Client::Impl::deliver(const Arrival& arrival, Report report) {
   callbacksFor<Report>().call(report);
 }
 
-template <wire::WireMessage M, class Use>
-void Client::Impl::decode(const Arrival& arrival, Use&& use) {
-  const wire::Result<M> message = wire::decode<M>(arrival.bytes);
-  if (message) {
-    use(*message);
-  } else {
-    ++damaged;
-  }
+template <wire::WireMessage M>
+void Client::Impl::handle(const Arrival& arrival, const M& message) {
+  deliver(arrival, toReport(message));
 }
 
-void Client::Impl::dispatch(const Arrival& arrival) {
-  if (arrival.what == Arrival::What::message) {
-    if (arrival.sender == sender) dispatchMessage(arrival);
-    return;
-  }
-  const bool up = arrival.what == Arrival::What::connected;
-  if (!up) {
-    for (const auto& [button, pressed] : latest.pressed) {
-      if (pressed) heldAtLoss.insert(button);
-    }
-    latest = {};
-  } else {
-    ++connectionsReported;
-  }
-  callbacksFor<ConnectionReport>().call({arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
+void Client::Impl::handle(const Arrival& arrival, const wire::ButtonChange& change) {
+  heldAtLoss.erase(change.button);
+  deliver(arrival, ButtonReport{{}, change.button, change.state != 0});
 }
 
 // Servers resend all button states periodically; report changes only, and once what a person let go while
@@ -200,89 +238,50 @@ void Client::Impl::handle(const Arrival& arrival, const wire::ButtonStates& stat
   }
 }
 
-void Client::Impl::dispatchMessage(const Arrival& a) {
-  switch (a.kind) {
-    case wire::kindOf<wire::TrackerPosQuat>:
-      return decode<wire::TrackerPosQuat>(a, [&](const auto& m) {
-        deliver(a, PoseReport{{}, m.sensor, m.position, m.orientation});
-      });
-    case wire::kindOf<wire::Force>:
-      return decode<wire::Force>(a, [&](const auto& m) { deliver(a, ForceReport{{}, m.force}); });
-    case wire::kindOf<wire::IsTouching>:
-      return decode<wire::IsTouching>(a, [&](const auto& m) {
-        deliver(a, TouchingReport{{}, m.touching != 0});
-      });
-    case wire::kindOf<wire::Dop>:
-      return decode<wire::Dop>(a, [&](const auto& m) { deliver(a, DepthReport{{}, m.depth}); });
-    case wire::kindOf<wire::Scp>:
-      return decode<wire::Scp>(a, [&](const auto& m) {
-        deliver(a, ContactPointReport{{}, m.position, m.orientation});
-      });
-    case wire::kindOf<wire::TouchedObject>:
-      return decode<wire::TouchedObject>(a, [&](const auto& m) {
-        deliver(a, TouchedObjectReport{{}, m.object});
-      });
-    case wire::kindOf<wire::Angle>:
-      return decode<wire::Angle>(a, [&](const auto& m) {
-        deliver(a, AngleReport{{}, m.angle, m.touching != 0});
-      });
-    case wire::kindOf<wire::TrackerVelocity>:
-      return decode<wire::TrackerVelocity>(a, [&](const auto& m) {
-        deliver(a, VelocityReport{{}, m.sensor, m.velocity, m.rotation, m.interval});
-      });
-    case wire::kindOf<wire::TrackerAcceleration>:
-      return decode<wire::TrackerAcceleration>(a, [&](const auto& m) {
-        deliver(a, AccelerationReport{{}, m.sensor, m.acceleration, m.rotation, m.interval});
-      });
-    case wire::kindOf<wire::ButtonChange>:
-      return decode<wire::ButtonChange>(a, [&](const auto& m) {
-        heldAtLoss.erase(m.button);
-        deliver(a, ButtonReport{{}, m.button, m.state != 0});
-      });
-    case wire::kindOf<wire::ButtonStates>:
-      return decode<wire::ButtonStates>(a, [&](const auto& m) { handle(a, m); });
-    case wire::kindOf<wire::AnalogChannels>:
-      return decode<wire::AnalogChannels>(a, [&](const auto& m) {
-        deliver(a, AnalogReport{{}, m.channels.values});
-      });
-    case wire::kindOf<wire::ForceError>:
-      return decode<wire::ForceError>(a, [&](const auto& m) {
-        deliver(a, ForceErrorReport{{}, static_cast<hapticd::ForceError>(m.code)});
-      });
-    case wire::kindOf<wire::Text>:
-      return decode<wire::Text>(a, [&](const auto& m) {
-        const std::string text = base::printable(m.text.text);
-        if (m.severity >= wire::kTextError && firstError.empty()) firstError = text;
-        deliver(a, TextReport{{}, static_cast<Severity>(std::min(m.severity, wire::kTextError)), text});
-      });
-    case wire::kindOf<wire::TrackerToRoom>:
-      return decode<wire::TrackerToRoom>(a, [&](const auto& m) {
-        deliver(a, ToRoomReport{{}, m.position, m.orientation});
-      });
-    case wire::kindOf<wire::TrackerUnitToSensor>:
-      return decode<wire::TrackerUnitToSensor>(a, [&](const auto& m) {
-        deliver(a, UnitToSensorReport{{}, m.sensor, m.position, m.orientation});
-      });
-    case wire::kindOf<wire::TrackerWorkspace>:
-      return decode<wire::TrackerWorkspace>(a, [&](const auto& m) {
-        deliver(a, WorkspaceReport{{}, m.min, m.max});
-      });
-    case wire::kindOf<wire::TickReport>:
-      return decode<wire::TickReport>(a, [&](const auto& m) { deliver(a, toReport(m)); });
-    case wire::kindOf<wire::ContactList>:
-      return decode<wire::ContactList>(a, [&](const auto& m) { deliver(a, toReport(m)); });
-    case wire::kindOf<wire::HandState>:
-      return decode<wire::HandState>(a, [&](const auto& m) {
-        if (!numbersEveryContact(m)) return void(++damaged);
-        deliver(a, toReport(m));
-      });
-    case wire::kindOf<wire::GuardState>:
-      return decode<wire::GuardState>(a, [&](const auto& m) {
-        deliver(a, GuardReport{{}, Trips(m.active), Trips(m.latched), m.armed != 0, m.stopped != 0});
-      });
-    default:
-      return;  // pongs, and commands, which only servers handle
+void Client::Impl::handle(const Arrival& arrival, const wire::Text& message) {
+  const std::string text = base::printable(message.text.text);
+  if (message.severity >= wire::kTextError && firstError.empty()) firstError = text;
+  const auto severity = static_cast<Severity>(std::min(message.severity, wire::kTextError));
+  deliver(arrival, TextReport{{}, severity, text});
+}
+
+void Client::Impl::handle(const Arrival& arrival, const wire::HandState& state) {
+  if (numbersEveryContact(state)) {
+    deliver(arrival, toReport(state));
+  } else {
+    ++damaged;
   }
+}
+
+template <wire::WireMessage M>
+void Client::Impl::decode(const Arrival& arrival) {
+  if (const wire::Result<M> message = wire::decode<M>(arrival.bytes)) {
+    handle(arrival, *message);
+  } else {
+    ++damaged;
+  }
+}
+
+template <class... M>
+void Client::Impl::dispatchMessage(const Arrival& arrival, wire::MessageList<M...> /*all*/) {
+  static_cast<void>(((arrival.kind == wire::kindOf<M> && (decode<M>(arrival), true)) || ...));
+}
+
+void Client::Impl::dispatch(const Arrival& arrival) {
+  if (arrival.what == Arrival::What::message) {
+    if (arrival.sender == sender) dispatchMessage(arrival, MessagesForClients{});
+    return;
+  }
+  const bool up = arrival.what == Arrival::What::connected;
+  if (!up) {
+    for (const auto& [button, pressed] : latest.pressed) {
+      if (pressed) heldAtLoss.insert(button);
+    }
+    latest = {};
+  } else {
+    ++connectionsReported;
+  }
+  callbacksFor<ConnectionReport>().call({arrival.arrived, up, std::string(wire::asText(arrival.bytes))});
 }
 
 #define HAPTICD_ON(name, Type, text)                                     \

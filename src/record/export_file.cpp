@@ -15,17 +15,23 @@ constexpr int kMostNames = 100;
 }  // namespace
 
 ExportFile::ExportFile(const std::filesystem::path& path, Unfinished unfinished)
-    : path_(path), target_(path), written_(path) {
+    : path_(path), unfinished_(unfinished), target_(path), written_(path) {
   namespace fs = std::filesystem;
   std::error_code none;
   const fs::file_type type = fs::status(path, none).type();
   const fs::file_type entry = fs::symlink_status(path, none).type();
   isPlain_ = entry == fs::file_type::regular || entry == fs::file_type::not_found;
-  if (unfinished == Unfinished::kept ||
-      (type != fs::file_type::regular && type != fs::file_type::not_found)) {
+  const bool isNew = type == fs::file_type::not_found;
+  if (type == fs::file_type::regular || (isNew && unfinished == Unfinished::dropped)) {
+    createBeside();
+  } else {
     create(base::Existing::replace);
-    return;
   }
+}
+
+void ExportFile::createBeside() {
+  namespace fs = std::filesystem;
+  std::error_code none;
   for (int link = 0; link < kMostLinks && fs::is_symlink(target_, none); ++link)
     target_ = target_.parent_path() / fs::read_symlink(target_, none);
   // Of another program, or of one that was killed.
@@ -59,18 +65,20 @@ void ExportFile::removeEmpty() const noexcept {
   }
 }
 
+// It cannot report an error: callers that need the file whole call close().
 ExportFile::~ExportFile() {
   if (!file_) return;
+  const bool isKept = unfinished_ == Unfinished::kept || written_ == target_;
   try {
-    if (written_ == target_) {
-      if (!failed_) close();
-      file_.reset();
-    } else {
-      file_.reset();
-      base::world().files.remove(written_);
-    }
+    if (isKept && !failed_) close();
   } catch (const std::exception&) {
-    // A destructor cannot report it: callers that need the file whole call close().
+    failed_ = true;
+  }
+  file_.reset();
+  try {
+    if (written_ != target_) base::world().files.remove(written_);
+  } catch (const std::exception&) {
+    // It stays.
   }
   if (failed_ && isPlain_) removeEmpty();
 }
@@ -89,16 +97,23 @@ void ExportFile::flush() {
     throw RecordingError("writing '" + path_.string() + "' failed: " + error.code().message() +
                          "; make room on the disk");
   }
+  if (unfinished_ == Unfinished::kept) takeName();
+}
+
+void ExportFile::takeName() {
+  if (written_ == target_) return;
+  try {
+    base::world().files.rename(written_, target_);
+  } catch (const std::system_error& error) {
+    failToCreate(error.code());
+  }
+  written_ = target_;
 }
 
 void ExportFile::close() {
   if (!file_) return;
   flush();
-  try {
-    if (written_ != target_) base::world().files.rename(written_, target_);
-  } catch (const std::system_error& error) {
-    failToCreate(error.code());
-  }
+  takeName();
   file_.reset();
 }
 

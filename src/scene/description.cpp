@@ -16,6 +16,7 @@ void ObjectTable::describe(SceneDescription& out) const {
     to.name = object->name;
     to.worldUnits = object->worldUnits();
     to.T_world_object = frameOf(*object) * Eigen::UniformScaling<double>(object->worldUnits());
+    to.T_parent_object = object->T_parent_object;
     to.T_object_mesh = object->T_object_mesh;
     to.surface = object->surface;
     if (const MeshGeometry* mesh = object->geometry.get()) {

@@ -23,7 +23,8 @@ struct ObjectDescription {
   bool touchable = true;
   std::string name;       ///< for people; may be empty
   double worldUnits = 1;  ///< of one unit of the object, in which clients place it: 1000 for stock geometry
-  Affine T_world_object = Affine::Identity();  ///< world units; where it is, or is on its way to
+  Affine T_world_object = Affine::Identity();   ///< world units; where it is, or is on its way to
+  Affine T_parent_object = Affine::Identity();  ///< as setTransformMatrix takes it
   Affine T_object_mesh = Affine::Identity();
   Surface surface;  ///< as rendered
   /// The mesh that is rendered, null when there is none; equal pointers mean an equal shape. While it

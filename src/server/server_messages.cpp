@@ -16,6 +16,18 @@ constexpr Nanos kRefusalPeriod = 1'000'000'000;
 // A program that sends one batch after the other learns of each what became of it.
 constexpr int kRefusedCommits = 20;
 
+namespace {
+
+// As in the texts of the rooms: extensions without the prefix that they have on the wire.
+std::string nameInTexts(wire::MessageKind kind) {
+  constexpr std::string_view kPrefix = "hapticd ";
+  std::string_view name = wire::info(kind).name;
+  if (name.starts_with(kPrefix)) name.remove_prefix(kPrefix.size());
+  return std::string(name);
+}
+
+}  // namespace
+
 // Dispatch by role: control messages never wait for the scene.
 void Server::onMessage(Session& session, const wire::MessageReceived& message, Nanos received) {
   Station* station = stationOf(message.local_sender);
@@ -214,7 +226,7 @@ bool Server::mayCommand(Session& session, Station& station, const wire::MessageR
                wire::Text{.severity = wire::kTextError,
                           .level = static_cast<std::uint32_t>(ofRefusedBatch ? RefusalCode::batchRefused
                                                                              : RefusalCode::notPermitted),
-                          .text = std::string(wire::info(message.kind).name) +
+                          .text = nameInTexts(message.kind) +
                                   (ofRefusedBatch ? " refused with its batch: " : " refused: ") + reason});
   return false;
 }

@@ -40,6 +40,21 @@ refused 2 "hapticd bench: there is no benchmark 'xyzzyx'; hapticd bench --list" 
 refused 2 "hapticd bench: unknown option '--nothing-alike'; 'hapticd bench --help'" "$hapticd" bench --nothing-alike
 refused 2 "hapticd bench: unknown option '--ful'; did you mean '--full'?" "$hapticd" bench --ful
 refused 2 "hapticd bench: --json requires --list" "$hapticd" bench --json
+# No flag takes a value, neither of a command nor of the program; the man pages tell which options are flags.
+"$hapticd" manual "$work/manual"
+flags=0
+for page in "$work"/manual/man/man1/hapticd*.1; do
+  page=${page##*/}
+  command=${page%.1} command=${command#hapticd} command=${command#-}
+  for flag in $(sed -nE 's/\\-/-/g; s/^\.B (-[A-Za-z], )?(--[a-z-]+)$/\2/p' "$work/manual/man/man1/$page"); do
+    for value in 3 no; do
+      refused 2 "hapticd${command:+ $command}: $flag takes no value; 'hapticd${command:+ $command} --help'" \
+        "$hapticd" $command "$flag=$value"
+    done
+    flags=$((flags + 1))
+  done
+done
+[ "$flags" -gt 40 ] || { echo "only $flags flags were found"; exit 1; }
 refused 2 "nothing to render" "$hapticd" render
 refused 2 "excludes" "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --true-size --size-mm 3
 refused 2 "excludes" "$hapticd" record Phantom@localhost --server --end --seconds 5

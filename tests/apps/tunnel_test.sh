@@ -68,7 +68,7 @@ awk '/peak force/ { if ($3 > 0.1) force = 1 } END { exit !force }' "$work/out" |
 "$hapticd" tunnel "$address" --port 0 --fingerprint "$fingerprint" >"$work/observers" 2>&1 &
 observers=$!
 refused "$hapticd" record "Phantom@$(await "$work/observers" '(tcp:\/\/[0-9.]+:[0-9]+);')" --server --detach
-grep -q 'Recording_Control refused: ' "$work/out" || { cat "$work/out"; exit 1; }
+grep -q ': Recording_Control refused: ' "$work/out" || { cat "$work/out"; exit 1; }
 
 # A call-back client is refused in words.
 refused timeout 10 "$hapticd" stop "Phantom@$local"

@@ -2,8 +2,10 @@
 #include "record/export.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <fstream>
 
 #include "base/fake_world.h"
@@ -157,6 +159,62 @@ TEST(ExportFile, OfAFullDiskNoEmptyFileIsLeft) {
     EXPECT_THROW(kept.flush(), RecordingError);
   }
   EXPECT_EQ(world.files.text("/my.csv"), "hea");
+}
+
+// A disk that is full for this process.
+class FullDisk {
+ public:
+  FullDisk() : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit none{.rlim_cur = 0, .rlim_max = before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*const signal_)(int);
+  rlimit before_{};
+};
+
+TEST(ExportFile, WhatIsKeptReplacesAFileByItsFirstBytes) {
+  const RecordingFile file;
+  const std::filesystem::path part = file.path().string() + ".part";
+  std::ofstream(file.path()) << "good";
+  for (const bool closed : {true, false}) {
+    bool failed = false;
+    {
+      const FullDisk full;
+      ExportFile kept(file.path(), Unfinished::kept);
+      kept.write("better");
+      try {
+        if (closed) kept.close();
+      } catch (const RecordingError&) {
+        failed = true;
+      }
+    }
+    EXPECT_EQ(failed, closed);
+    EXPECT_EQ(textOf(file.path()), "good");
+    EXPECT_FALSE(std::filesystem::exists(part));
+  }
+  ExportFile kept(file.path(), Unfinished::kept);
+  kept.write("better");
+  EXPECT_EQ(textOf(file.path()), "good");
+  kept.flush();
+  EXPECT_EQ(textOf(file.path()), "better");
+  EXPECT_FALSE(std::filesystem::exists(part));
+  {
+    const FullDisk full;
+    kept.write(", longer");
+    EXPECT_THROW(kept.close(), RecordingError);
+  }
+  EXPECT_EQ(textOf(file.path()), "better");
+  { ExportFile(file.path(), Unfinished::kept).write("best"); }
+  EXPECT_EQ(textOf(file.path()), "best");
 }
 
 // Of a vrpn.cfg in Latin-1. Readers of CSV and MCAP refuse a whole file for such a byte.

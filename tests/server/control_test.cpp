@@ -224,7 +224,8 @@ TEST_F(ControlTest, ABatchIsTakenOrRefusedAsAWhole) {
   first->send(wire::Ping{});
   ASSERT_TRUE(first->untilNext<wire::Pong>());
   second->send(wire::BatchBegin{});
-  ASSERT_TRUE(second->untilText("hapticd Batch_Begin refused: client"));
+  ASSERT_TRUE(second->untilText("Batch_Begin refused: client"));
+  EXPECT_EQ(second->texts().back().text.text.find("Batch_Begin"), 0U);  // without the "hapticd " of the wire
   EXPECT_EQ(second->texts().back().level, static_cast<std::uint32_t>(server::RefusalCode::notPermitted));
   first->send(wire::ReleaseControl{});
   first->send(wire::Ping{});

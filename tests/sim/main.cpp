@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -148,15 +149,7 @@ Script shrink(Script script, const Outcome& first, double budget_s) {
   return script;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  // One thread only, also for the library that builds the index.
-  setenv("HAPTICD_EMBREE", "threads=1,user_threads=1", 0);
-  setenv("TZ", "UTC", 1);
-  // The meshes of uploads are kept for the next ones, instead of new pages for each.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+struct Options {
   std::uint64_t first = 1;
   std::uint64_t last = 20;
   double seconds = 20;
@@ -167,110 +160,143 @@ int main(int argc, char** argv) {
   bool wantsShrink = false;
   bool verbose = false;
   bool watches = false;
-  char** replayOptions = argv + argc;
+  bool help = false;
+  char** replayOptions = nullptr;  // ends with a null
+};
+
+// Nothing, or what cannot be used.
+std::optional<std::string> read(int argc, char** argv, Options& to) {
+  to.replayOptions = argv + argc;
   for (int i = 1; i < argc; ++i) {
     const std::string_view option = argv[i];
     const std::string_view value = i + 1 < argc ? argv[i + 1] : "";
     bool ok = true;
-    if (option == "--help") {
-      std::fputs(kHelp, stdout);
-      return 0;
-    }
     if (option == "--") {
-      replayOptions = argv + i + 1;
-      break;
+      to.replayOptions = argv + i + 1;
+      return {};
     }
     if (option == "--seed" || option == "--watch") {
-      ok = parse(value, first);
-      last = first;
-      watches = option == "--watch";
+      ok = parse(value, to.first);
+      to.last = to.first;
+      to.watches = option == "--watch";
       ++i;
     } else if (option == "--seeds") {
       const std::size_t dash = value.find('-');
-      ok = dash != std::string_view::npos && parse(value.substr(0, dash), first) &&
-           parse(value.substr(dash + 1), last);
+      ok = dash != std::string_view::npos && parse(value.substr(0, dash), to.first) &&
+           parse(value.substr(dash + 1), to.last);
       ++i;
     } else if (option == "--seconds") {
-      ok = parse(value, seconds) && seconds > 0 && seconds <= 86400;
+      ok = parse(value, to.seconds) && to.seconds > 0 && to.seconds <= 86400;
       ++i;
     } else if (option == "--cpu") {
-      ok = parse(value, cpu);
+      ok = parse(value, to.cpu);
       ++i;
-    } else if (option == "--first") {
-      stopsAtFirst = true;
-    } else if (option == "--twice") {
-      twice = true;
-    } else if (option == "--shrink") {
-      wantsShrink = true;
     } else if (option == "--shrink-cpu") {
-      ok = parse(value, shrinkCpu) && shrinkCpu > 0;
+      ok = parse(value, to.shrinkCpu) && to.shrinkCpu > 0;
       ++i;
+    } else if (option == "--help") {
+      to.help = true;
+    } else if (option == "--first") {
+      to.stopsAtFirst = true;
+    } else if (option == "--twice") {
+      to.twice = true;
+    } else if (option == "--shrink") {
+      to.wantsShrink = true;
     } else if (option == "--verbose") {
-      verbose = true;
+      to.verbose = true;
     } else {
       ok = false;
     }
-    if (!ok) {
-      std::fprintf(stderr, "hapticd-sim: cannot use '%s %s'\n%s", std::string(option).c_str(),
-                   std::string(value).c_str(), kHelp);
-      return 2;
-    }
+    if (!ok) return std::string(option) + ' ' + std::string(value);
+  }
+  return {};
+}
+
+unsigned long long u(std::uint64_t n) {
+  return n;
+}
+
+Outcome runSeed(std::uint64_t seed, const Options& options) {
+  const Script script = hapticd::sim::drawScript(seed, options.seconds);
+  Outcome outcome = run(script, options.verbose);
+  if (options.twice && run(script).hash != outcome.hash)
+    outcome.findings.push_back("a second run of the seed differs from the first");
+  std::printf("seed %llu: %016llx, %llu ticks, %llu with force, %llu faults\n", u(seed), u(outcome.hash),
+              u(outcome.ticks), u(outcome.ticksWithForce), u(outcome.faults));
+  for (const std::string& text : outcome.findings) std::printf("  finding: %s\n", text.c_str());
+  if (!outcome.findings.empty() && options.wantsShrink)
+    std::printf("  what it needs:\n%s", describe(shrink(script, outcome, options.shrinkCpu)).c_str());
+  std::fflush(stdout);
+  return outcome;
+}
+
+class Total {
+ public:
+  void add(const Outcome& outcome, double seconds) {
+    ++runs_;
+    failed_ += outcome.findings.empty() ? 0U : 1U;
+    simulated_s_ += seconds;
+    sum_.ticks += outcome.ticks;
+    sum_.ticksWithForce += outcome.ticksWithForce;
+    sum_.ticksInside += outcome.ticksInside;
+    sum_.steps += outcome.steps;
+    sum_.preemptions += outcome.preemptions;
+    sum_.faults += outcome.faults;
+    sum_.latches += outcome.latches;
+    sum_.stops += outcome.stops;
+    sum_.tickReports += outcome.tickReports;
+    sum_.missedReports += outcome.missedReports;
+    sum_.replayedTicks += outcome.replayedTicks;
+    sum_.seeks += outcome.seeks;
+    sum_.slowestStop = std::max(sum_.slowestStop, outcome.slowestStop);
+  }
+  std::uint64_t failed() const { return failed_; }
+  void print() const {
+    std::printf(
+        "%llu runs, %.0f s simulated, %llu ticks (%llu with force, %llu inside the cube), %llu steps, %llu "
+        "preemptions, %llu faults, %llu latches, %llu stops (slowest read %.3f ms), %llu tick reports (%llu "
+        "skipped), %llu ticks replayed, %llu seeks; %llu with findings\n",
+        u(runs_), simulated_s_, u(sum_.ticks), u(sum_.ticksWithForce), u(sum_.ticksInside), u(sum_.steps),
+        u(sum_.preemptions), u(sum_.faults), u(sum_.latches), u(sum_.stops),
+        static_cast<double>(sum_.slowestStop) * 1e-6, u(sum_.tickReports), u(sum_.missedReports),
+        u(sum_.replayedTicks), u(sum_.seeks), u(failed_));
+    std::fprintf(stderr, "%.1f s of processor time, %.1f x real time\n", cpuSeconds(),
+                 simulated_s_ / cpuSeconds());
   }
 
-  if (watches) return watch(first, seconds, replayOptions);
+ private:
+  std::uint64_t runs_ = 0;
+  std::uint64_t failed_ = 0;
+  double simulated_s_ = 0;
+  Outcome sum_;
+};
 
-  std::uint64_t runs = 0;
-  std::uint64_t failed = 0;
-  Outcome sum;
-  double simulated = 0;
-  for (std::uint64_t seed = first; seed <= last; ++seed) {
-    const Script script = hapticd::sim::drawScript(seed, seconds);
-    Outcome outcome = run(script, verbose);
-    if (twice) {
-      const Outcome again = run(script);
-      if (again.hash != outcome.hash)
-        outcome.findings.push_back("a second run of the seed differs from the first");
-    }
-    ++runs;
-    simulated += seconds;
-    std::printf("seed %llu: %016llx, %llu ticks, %llu with force, %llu faults\n",
-                static_cast<unsigned long long>(seed), static_cast<unsigned long long>(outcome.hash),
-                static_cast<unsigned long long>(outcome.ticks),
-                static_cast<unsigned long long>(outcome.ticksWithForce),
-                static_cast<unsigned long long>(outcome.faults));
-    for (const std::string& text : outcome.findings) std::printf("  finding: %s\n", text.c_str());
-    if (!outcome.findings.empty()) {
-      ++failed;
-      if (wantsShrink) {
-        std::printf("  what it needs:\n%s", describe(shrink(script, outcome, shrinkCpu)).c_str());
-      }
-    }
-    std::fflush(stdout);
-    sum.ticks += outcome.ticks;
-    sum.ticksWithForce += outcome.ticksWithForce;
-    sum.ticksInside += outcome.ticksInside;
-    sum.steps += outcome.steps;
-    sum.preemptions += outcome.preemptions;
-    sum.faults += outcome.faults;
-    sum.latches += outcome.latches;
-    sum.stops += outcome.stops;
-    sum.tickReports += outcome.tickReports;
-    sum.missedReports += outcome.missedReports;
-    sum.replayedTicks += outcome.replayedTicks;
-    sum.seeks += outcome.seeks;
-    sum.slowestStop = std::max(sum.slowestStop, outcome.slowestStop);
-    if ((stopsAtFirst && failed > 0) || (cpu > 0 && cpuSeconds() > cpu)) break;
+}  // namespace
+
+int main(int argc, char** argv) {
+  // One thread only, also for the library that builds the index.
+  setenv("HAPTICD_EMBREE", "threads=1,user_threads=1", 0);
+  setenv("TZ", "UTC", 1);
+  // The meshes of uploads are kept for the next ones, instead of new pages for each.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  Options options;
+  if (const auto wrong = read(argc, argv, options)) {
+    std::fprintf(stderr, "hapticd-sim: cannot use '%s'\n%s", wrong->c_str(), kHelp);
+    return 2;
   }
-  const auto u = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
-  std::printf(
-      "%llu runs, %.0f s simulated, %llu ticks (%llu with force, %llu inside the cube), %llu steps, %llu "
-      "preemptions, %llu faults, %llu latches, %llu stops (slowest read %.3f ms), %llu tick reports (%llu "
-      "skipped), %llu ticks replayed, %llu seeks; %llu with findings\n",
-      u(runs), simulated, u(sum.ticks), u(sum.ticksWithForce), u(sum.ticksInside), u(sum.steps),
-      u(sum.preemptions), u(sum.faults), u(sum.latches), u(sum.stops),
-      static_cast<double>(sum.slowestStop) * 1e-6, u(sum.tickReports), u(sum.missedReports),
-      u(sum.replayedTicks), u(sum.seeks), u(failed));
-  std::fprintf(stderr, "%.1f s of processor time, %.1f x real time\n", cpuSeconds(),
-               simulated / cpuSeconds());
-  return failed == 0 ? 0 : 1;
+  if (options.help) {
+    std::fputs(kHelp, stdout);
+    return 0;
+  }
+  if (options.watches) return watch(options.first, options.seconds, options.replayOptions);
+
+  Total total;
+  for (std::uint64_t seed = options.first; seed <= options.last; ++seed) {
+    total.add(runSeed(seed, options), options.seconds);
+    if (options.stopsAtFirst && total.failed() > 0) break;
+    if (options.cpu > 0 && cpuSeconds() > options.cpu) break;
+  }
+  total.print();
+  return total.failed() == 0 ? 0 : 1;
 }

@@ -577,6 +577,81 @@ test("in forced colours it is seen which of several is chosen, and colours that 
   await end(viewer, server);
 });
 
+test("a seek or a speed right after a pause leaves the replay paused", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  // In one task: the next state of the server would bring the pause, too.
+  const paused = await viewer.ask(`(() => {
+    const { replay } = viewer;
+    const [slider, speed] = ["input[type=range]", "select"].map((what) => document.querySelector("#replay " + what));
+    const sent = [];
+    replay.send = (...messages) => sent.push(...messages.map((m) => new DataView(m.payload.slice().buffer).getInt16(0)));
+    replay.update({ file: "a.haptics", position_s: 1, duration_s: 9, speed: 1, paused: false, ended: false, loop: false, contacts: [], trips: [], markers: [] });
+    const seek = () => slider.dispatchEvent(new Event("input"));
+    seek();
+    document.querySelector("#replay button").click();
+    seek();
+    speed.dispatchEvent(new Event("change"));
+    document.querySelector("#replay button").click();
+    seek();
+    return sent;
+  })()`);
+  assert.deepEqual(paused, [0, 1, 1, 1, 0, 0]);
+  await end(viewer, server);
+});
+
+test("paused plots are saved with the marks of their time", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  await viewer.until("samples", () => viewer.ask("viewer.plots.force.data()[0].length > 2"));
+  const [held, live] = await viewer.ask(`(() => {
+    const { plots } = viewer;
+    const pause = document.querySelector("#plots-pause");
+    pause.click();
+    const last = plots.force.data()[0].at(-1);
+    plots.marker(last, "within");
+    plots.marker(last + 1, "after");
+    const held = plots.csv();
+    pause.click();
+    return [held, plots.csv()];
+  })()`);
+  // Trips of a late tick may be among them.
+  const own = (csv) => [...csv.matchAll(/^# [0-9.]+ (within|after)$/gm)].map(([, label]) => label);
+  assert.deepEqual(own(held), ["within"]);
+  assert.deepEqual(own(live), ["within", "after"]);
+  await end(viewer, server);
+});
+
+test("the letters L and M can be switched off, and Esc stops in any case", async () => {
+  const server = await Server.start(hapticd);
+  const viewer = await opened(server);
+  const { page } = viewer;
+  const box = page.getByLabel("keys L and M");
+  const marks = async () => {
+    await page.keyboard.press("m");
+    return viewer.ask("viewer.marked");
+  };
+  assert.equal(await marks(), 1);
+  await box.uncheck();
+  await viewer.holdInAir();
+  await page.keyboard.press("l");
+  assert.equal(await viewer.ask("viewer.hand.held"), true);
+  assert.equal(await marks(), 1);
+  assert.equal(await page.isVisible("#mark kbd"), false);
+  await page.reload();
+  await viewer.connected();
+  assert.equal(await box.isChecked(), false);
+  assert.equal(await viewer.ask("document.activeElement === document.body"), true);
+  await page.keyboard.press("m");
+  assert.equal(await viewer.ask("viewer.marked"), 0);
+  await page.keyboard.press("Escape");
+  await until("a stop", async () => (await server.state()).devices[0].guard.stopped);
+  await box.check();
+  assert.equal(await marks(), 1);
+  assert.equal(await page.isVisible("#mark kbd"), true);
+  await end(viewer, server);
+});
+
 test("a page of a replay moves the hand of the live server that follows", async () => {
   const recording = join(folder, "short.haptics");
   const recorded = await Server.start(hapticd, { more: ["--record", recording] });

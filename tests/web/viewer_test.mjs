@@ -308,6 +308,42 @@ test("an object is moved, turned and scaled after loading", async () => {
   await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
 });
 
+test("a field that is edited changes nothing else of an object or effect", async () => {
+  const { wire, send, close } = await server.client();
+  const scene = async () => (await server.state()).scenes[0];
+  const before = [...[0.9876543, 0.0123456, 0, 0, -0.0123456, 0.9876543, 0, 0, 0, 0, 0.9877777, 0], 1 / 3, -20 / 7, 1.23456789, 1];
+  send(wire.setTransformMatrix(0, before));
+  const gain = Math.fround(0.0123456789);
+  const effect = { type: "spring", index: 7, gain, magnitude_N: 1.5, duration_ms: 0, frequency: 0, position: [1 / 3, 2, 3], direction: [0, 1, 0] };
+  send(wire.setEffect(effect));
+  const spring = async () => (await scene()).effects.find((e) => e.index === 7);
+  const sent = await until("the effect", spring);
+  await until("the placement", async () => (await scene()).objects[0].T_parent_object[12] === before[12]);
+  const edit = async (label, value) => {
+    const field = viewer.page.getByLabel(label);
+    await field.fill(value);
+    await field.press("Enter");
+  };
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
+  await viewer.page.locator("[data-effect='7'] summary").click();
+  await viewer.until("the placement in the form", async () =>
+    (await viewer.page.getByLabel("Scale of object 0").inputValue()).startsWith("0.987"));
+  await edit("Position y of object 0", "12.5");
+  const after = await until("moved", async () => {
+    const matrix = (await scene()).objects[0].T_parent_object;
+    return matrix[13] !== before[13] && matrix;
+  });
+  assert.deepEqual(after, before.with(13, after[13]));
+  await edit("Limit, N of effect 7", "1.25");
+  const changed = await until("another limit", async () => (await spring()).magnitude_N === 1.25 && (await spring()));
+  assert.deepEqual(changed, { ...sent, magnitude_N: 1.25 });
+  await viewer.page.getByLabel("Remove effect 7").click();
+  await viewer.page.locator("[data-object='0'] summary", { hasText: "Placement" }).click();
+  send(wire.setTransformMatrix(0, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]));
+  await until("back", async () => (await scene()).objects[0].T_parent_object[12] === 0);
+  close();
+});
+
 test("a dropped mesh can be touched", async () => {
   await viewer.holdInAir(); // a mesh that appears around the HIP keeps it inside
   await viewer.drop({ "cube.obj": CUBE });

@@ -4,6 +4,7 @@ import "uplot/dist/uPlot.min.css";
 import "./viewer.css";
 import { DropMesh } from "./drop_mesh";
 import { type DragMode, Hand, type HandContext, refusesHand } from "./hand";
+import { bindLetterKeys } from "./letter_keys";
 import { Link } from "./link";
 import { LivePlots } from "./live_plots";
 import { showNotice, toast } from "./notice";
@@ -100,6 +101,7 @@ class Page {
   private readonly effects = new EffectsPanel(byId("effects"), (...m) => this.command(...m));
   private readonly deviceChoice = byId<HTMLSelectElement>("device");
   private readonly quantity = byId<HTMLSelectElement>("quantity");
+  private readonly lettersAct = bindLetterKeys();
 
   start(): void {
     startTheme(() => this.restyle());
@@ -144,7 +146,7 @@ class Page {
     if (e.key === "Escape") return this.stop();
     const typing =
       e.target instanceof HTMLElement && e.target.matches("input[type=number], input[type=text], input[type=password], select");
-    if (typing || e.ctrlKey || e.metaKey || e.altKey) return;
+    if (typing || e.ctrlKey || e.metaKey || e.altKey || !this.lettersAct()) return;
     if (e.key.toLowerCase() === "l") this.hand.letGo();
     if (e.key.toLowerCase() === "m" && !e.repeat) this.mark();
   }

@@ -72,6 +72,8 @@ export interface ObjectState extends SurfaceState {
   geometry: number;
   display_triangles: number;
   T_world_object: number[];
+  /** As setTransformMatrix() takes it. */
+  T_parent_object: number[];
   T_object_mesh: number[];
   mass_kg: number;
 }

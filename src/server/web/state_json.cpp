@@ -121,6 +121,7 @@ Json json(const scene::ObjectDescription& object, std::uint64_t geometry, std::s
           {"geometry", geometry},
           {"display_triangles", displayTriangles},
           {"T_world_object", json(object.T_world_object)},
+          {"T_parent_object", json(object.T_parent_object)},
           {"T_object_mesh", json(object.T_object_mesh)},
           {"stiffness_N_per_m", object.surface.stiffness_N_per_m},
           {"damping_Ns_per_m", object.surface.damping_Ns_per_m},

@@ -190,6 +190,8 @@ TEST_F(Web, ListsAnUntouchableChildWithItsPose) {
   EXPECT_EQ(child["T_world_object"],
             json::array({2e3, 0., 0., 0., 0., 2e3, 0., 0., 0., 0., 2e3, 0., 5e3, 6e3, 7e3, 1.}))
       << "an added object is a stock one, in metres";
+  EXPECT_EQ(child["T_parent_object"],
+            json::array({2., 0., 0., 0., 0., 2., 0., 0., 0., 0., 2., 0., 5., 6., 7., 1.}));
 }
 
 TEST_F(Web, ServesTheMeshAndNumbersItsShapes) {

@@ -388,7 +388,7 @@ test("every connection of a page begins with the same key, also after the page w
 });
 
 test("only a refusal of the hand makes the page forget the hand it holds", () => {
-  assert.ok(refusesHand(1, "hapticd Hold_Hand refused: this client may only observe"));
+  assert.ok(refusesHand(1, "Hold_Hand refused: this client may only observe"));
   assert.ok(refusesHand(3, "Hold_Hand refused: client 4 holds the hand"));
   assert.ok(!refusesHand(1, "vrpn_ForceDevice setHapticProperty refused: this client may only observe"));
   assert.ok(!refusesHand(7, "Rearm_Forces refused: client 4 stopped the forces; it may re-arm"));

@@ -10,7 +10,7 @@ const { readMesh } = await bundled("mesh/read_file.ts");
 const { decodeMesh } = await bundled("state.ts");
 const { smoothGeometry } = await bundled("scene3d/creases.ts");
 const { readMeshBeside } = await bundled("mesh/read_beside.ts");
-const { matrixPlacing } = await bundled("panels/pose.ts");
+const { matrixPlacing, placedAnew, placementOf } = await bundled("panels/pose.ts");
 const { Objects } = await bundled("scene3d/objects.ts");
 const { Color, Matrix4, Ray, Vector3 } = await bundled("../node_modules/three/build/three.module.js");
 
@@ -300,6 +300,51 @@ test("a mesh appears where it was placed: in metres, below a parent, in a scene 
   }
   const fresh = scene.clone().multiply(matrixPlacing(wanted, undefined, { T_world_scene: scene.toArray(), objects: [] }));
   fresh.elements.forEach((x, i) => assert.ok(Math.abs(x - wanted.elements[i]) < 1e-9, `${fresh.elements}`));
+});
+
+test("a placement that is edited changes in what was typed only", () => {
+  // Of no round numbers, sheared, below a parent that is turned and scaled, in metres.
+  const own = new Matrix4().set(0.71, 0.13, -0.2, 0.0123456789, 0.33, 0.91, 0.07, -1 / 3, -0.4, 0.11, 0.57, 2 / 7, 0, 0, 0, 1);
+  const turned = new Matrix4().makeRotationY(0.7).scale(new Vector3(2, 2, 2)).setPosition(3, 4, 5);
+  const centre = new Vector3(0.2, -0.3, 1 / 7);
+  const units = 1000;
+  for (const [parent, frame] of [[-1, new Matrix4()], [0, turned]]) {
+    const worldOf = (local) => {
+      const inUnits = new Matrix4().fromArray(local);
+      inUnits.setPosition(new Vector3().setFromMatrixPosition(inUnits).multiplyScalar(units));
+      return frame.clone().multiply(inUnits).multiply(new Matrix4().makeScale(units, units, units));
+    };
+    const o = {
+      id: 1,
+      parent,
+      world_units: units,
+      T_world_object: worldOf(own.toArray()).toArray(),
+      T_parent_object: own.toArray(),
+      T_object_mesh: new Matrix4().makeRotationX(0.2).toArray(),
+    };
+    const frames = {
+      T_world_scene: new Matrix4().toArray(),
+      objects: [{ id: 0, parent: -1, world_units: 1, T_world_object: frame.toArray(), T_object_mesh: new Matrix4().toArray() }, o],
+    };
+    const from = placementOf(o, centre);
+    const edited = (which, value) => placedAnew(from, from.numbers.with(which, value), o, centre, frames).T_parent_object;
+    const seenIn = (local) => placementOf({ ...o, T_parent_object: local, T_world_object: worldOf(local).toArray() }, centre).numbers;
+    const near = (numbers, wanted) => numbers.forEach((x, i) => assert.ok(Math.abs(x - wanted[i]) < 1e-6, `${numbers}, not ${wanted}`));
+    assert.deepEqual(edited(0, from.numbers[0]), o.T_parent_object);
+
+    const moved = edited(1, 12.5);
+    near(seenIn(moved), from.numbers.with(1, 12.5));
+    assert.deepEqual(moved.slice(0, 12), o.T_parent_object.slice(0, 12));
+    if (parent === -1) assert.deepEqual([moved[12], moved[14]], [o.T_parent_object[12], o.T_parent_object[14]]);
+
+    const scaled = edited(6, 3 * from.numbers[6]);
+    near(seenIn(scaled), from.numbers.with(6, 3 * from.numbers[6]));
+    near(scaled.slice(0, 12), o.T_parent_object.slice(0, 12).map((x) => 3 * x)); // the shear, too
+
+    const around = seenIn(edited(4, from.numbers[4] + 10));
+    near(around.slice(0, 3), from.numbers.slice(0, 3));
+    near([around[6]], [from.numbers[6]]);
+  }
 });
 
 test("a PLY file with more entries than bytes is refused at once", { timeout: 20_000 }, async () => {

@@ -28,6 +28,31 @@ export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** A number of the server in an input, rounded for people: what nobody typed keeps all its digits. */
+export class NumberField {
+  private exact = NaN;
+  private shown = "";
+
+  constructor(
+    readonly input: HTMLInputElement,
+    private readonly digits: number,
+  ) {}
+
+  /** Leaves the text of a field that is being edited. */
+  show(value: number): void {
+    this.exact = value;
+    if (document.activeElement === this.input) return;
+    const text = String(Number(value.toPrecision(this.digits)) + 0);
+    if (this.input.value !== text) this.input.value = text;
+    this.shown = this.input.value;
+  }
+
+  /** What was typed, NaN when that is no number; else what the server has. */
+  get value(): number {
+    return this.input.value === this.shown ? this.exact : this.input.valueAsNumber;
+  }
+}
+
 /** One row per item: created once, updated in place, removed with its item. */
 export class Rows<Item, Row extends { root: HTMLElement; update(item: Item): void }> {
   private readonly rows = new Map<string, Row>();

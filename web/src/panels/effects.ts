@@ -1,7 +1,7 @@
 // Force effects: starts, stops and edits defined ones, defines new ones, hides stopped ones.
 import { type Effect, type Outgoing, setEffect, startEffect, stopEffect, type Vec3 } from "../wire";
 import type { EffectState, VibrationUnit } from "../state_types";
-import { el, Rows, setText } from "./dom";
+import { el, NumberField, Rows, setText } from "./dom";
 import { CONFIRM_MS, Switch } from "./switch";
 
 type Send = (...messages: Outgoing[]) => void;
@@ -58,7 +58,10 @@ export const effectOf = (e: EffectState): Effect => ({
 
 class EffectForm {
   readonly root = el("div", { className: "placing" });
-  private readonly inputs: [Parameter, number, HTMLInputElement][] = [];
+  private readonly fields: [Parameter, number, NumberField][] = [];
+  private latest: Effect | undefined;
+  /** Until then the state of the server may be older than what was sent. */
+  private sentUntil_ms = 0;
 
   constructor(
     e: EffectState,
@@ -70,7 +73,7 @@ class EffectForm {
       const parts = Array.from({ length: count }, (_, i) => {
         const what = count === 3 ? `${label} ${"xyz"[i]!}` : label;
         const input = el("input", { type: "number", step: "any", ariaLabel: `${what} of effect ${e.index}` });
-        this.inputs.push([name, i, input]);
+        this.fields.push([name, i, new NumberField(input, 6)]);
         return input;
       });
       this.root.append(el("div", { className: "field" }, el("span", {}, label), ...parts));
@@ -78,25 +81,24 @@ class EffectForm {
     this.root.addEventListener("change", () => this.change());
   }
 
-  private latest: Effect | undefined;
   update(e: EffectState): void {
-    if (this.root.contains(document.activeElement) && this.latest) return;
+    if (performance.now() < this.sentUntil_ms) return;
     this.latest = effectOf(e);
-    for (const [name, i, input] of this.inputs) {
+    for (const [name, i, field] of this.fields) {
       const value = this.latest[name];
-      const text = String(Number((typeof value === "number" ? value : value[i]!).toPrecision(6)));
-      if (input.value !== text) input.value = text;
+      field.show(typeof value === "number" ? value : value[i]!);
     }
   }
 
   private change(): void {
-    if (!this.latest || this.inputs.some(([, , input]) => !Number.isFinite(input.valueAsNumber))) return;
+    if (!this.latest || this.fields.some(([, , field]) => !Number.isFinite(field.value))) return;
     const effect: Effect = { ...this.latest, position: [...this.latest.position], direction: [...this.latest.direction] };
-    for (const [name, i, input] of this.inputs) {
-      if (name === "position" || name === "direction") effect[name][i] = input.valueAsNumber;
-      else effect[name] = input.valueAsNumber;
+    for (const [name, i, field] of this.fields) {
+      if (name === "position" || name === "direction") effect[name][i] = field.value;
+      else effect[name] = field.value;
     }
     this.latest = effect;
+    this.sentUntil_ms = performance.now() + CONFIRM_MS;
     this.onChange(effect);
   }
 }

@@ -2,15 +2,14 @@
 import { Euler, MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 import { type Outgoing, setTransformMatrix } from "../wire";
 import type { ObjectState, SceneState } from "../state_types";
-import { el } from "./dom";
+import { el, NumberField } from "./dom";
+import { CONFIRM_MS } from "./switch";
 
 /** What placements below a parent depend on. */
 export type Frames = Pick<SceneState, "T_world_scene" | "objects">;
 
 /** The parent of objects that have none. */
 const SCENE = -1;
-
-const tidy = (x: number): string => String(Number(x.toPrecision(5)) + 0);
 
 /** The matrix below its parent in units of the object, for a placement of the object in the world. */
 function localMatrix(T_world_object: Matrix4, parent: Matrix4, worldUnits: number): Matrix4 {
@@ -28,14 +27,57 @@ export function matrixPlacing(T_world_mesh: Matrix4, o: ObjectState | undefined,
   return localMatrix(T_world_object, parentFrame(o, frames), o.world_units);
 }
 
+/** Where an object is, for people and for the server. */
+export interface Placement {
+  /** Position of the mesh's centre in the world, angles about x, y and z in degrees, scale. */
+  numbers: number[];
+  /** As setTransformMatrix() takes it. */
+  T_parent_object: number[];
+}
+
+/** `centre`: of the mesh, in its own frame. */
+export function placementOf(o: ObjectState, centre: Vector3): Placement {
+  const T = new Matrix4().fromArray(o.T_world_object);
+  const { rotation, size } = partsOf(T, o.world_units);
+  const { x, y, z } = new Euler().setFromQuaternion(rotation);
+  const at = inObject(o, centre).applyMatrix4(T);
+  return { numbers: [...at.toArray(), ...[x, y, z].map(MathUtils.radToDeg), size], T_parent_object: o.T_parent_object };
+}
+
+/** With other numbers: what does not depend on those that differ stays in every bit. */
+export function placedAnew(from: Placement, numbers: number[], o: ObjectState, centre: Vector3, frames: Frames): Placement {
+  const rotationOf = ([, , , ...degrees]: number[]): Matrix4 => {
+    const [x, y, z] = degrees.map(MathUtils.degToRad);
+    return new Matrix4().makeRotationFromEuler(new Euler(x, y, z));
+  };
+  const toWorld = parentFrame(o, frames).setPosition(0, 0, 0);
+  const toParent = toWorld.clone().invert();
+  const before = new Matrix4().fromArray(from.T_parent_object);
+  const at = new Vector3().setFromMatrixPosition(before);
+  const linear = before.clone().setPosition(0, 0, 0);
+  const after = linear.clone();
+  if (numbers.slice(3, 6).some((angle, i) => angle !== from.numbers[3 + i])) {
+    const turn = rotationOf(numbers).multiply(rotationOf(from.numbers).transpose());
+    after.premultiply(toWorld).premultiply(turn).premultiply(toParent);
+  }
+  const growth = numbers[6]! / from.numbers[6]!;
+  after.scale(new Vector3(growth, growth, growth));
+  const shift = new Vector3(...numbers.map((x, i) => x - from.numbers[i]!));
+  at.add(shift.applyMatrix4(toParent).divideScalar(o.world_units));
+  // Turned and scaled about the centre of the mesh.
+  const middle = inObject(o, centre);
+  at.add(middle.clone().applyMatrix4(linear).sub(middle.applyMatrix4(after)));
+  return { numbers, T_parent_object: after.setPosition(at).toArray() };
+}
+
 export class PoseForm {
   readonly root = el("div", { className: "placing" });
-  private readonly position: HTMLInputElement[];
-  private readonly rotation: HTMLInputElement[];
-  private readonly scale: HTMLInputElement;
+  private readonly fields: NumberField[];
   private object: ObjectState | undefined;
-  private parent = new Matrix4();
-  private centre = new Vector3();
+  private frames: Frames | undefined;
+  private placement: Placement | undefined;
+  /** Until then the state of the server may be older than what was sent. */
+  private sentUntil_ms = 0;
 
   constructor(
     private readonly id: number,
@@ -44,45 +86,31 @@ export class PoseForm {
   ) {
     const input = (label: string, min = ""): HTMLInputElement =>
       el("input", { type: "number", step: "any", min, ariaLabel: `${label} of object ${id}` });
-    this.position = ["x", "y", "z"].map((axis) => input(`Position ${axis}`));
-    this.rotation = ["x", "y", "z"].map((axis) => input(`Rotation about ${axis}, degrees,`));
-    this.scale = input("Scale", "0.0001");
-    const field = (label: string, ...parts: (Node | string)[]): HTMLElement =>
+    const position = ["x", "y", "z"].map((axis) => input(`Position ${axis}`));
+    const rotation = ["x", "y", "z"].map((axis) => input(`Rotation about ${axis}, degrees,`));
+    const scale = input("Scale", "0.0001");
+    this.fields = [...position, ...rotation, scale].map((each) => new NumberField(each, 5));
+    const row = (label: string, ...parts: (Node | string)[]): HTMLElement =>
       el("div", { className: "field" }, el("span", {}, label), ...parts);
-    this.root.append(field("Position", ...this.position), field("Rotation °", ...this.rotation), field("Scale", this.scale));
+    this.root.append(row("Position", ...position), row("Rotation °", ...rotation), row("Scale", scale));
     this.root.addEventListener("change", () => this.place());
   }
 
-  /** Shows the placement, unless a field is being edited. */
   update(o: ObjectState, frames: Frames): void {
-    if (this.root.contains(document.activeElement) && this.object) return;
+    if (performance.now() < this.sentUntil_ms) return;
     this.object = o;
-    this.parent = parentFrame(o, frames);
-    this.centre = this.centreOf(o.id).applyMatrix4(new Matrix4().fromArray(o.T_object_mesh));
-    const T = new Matrix4().fromArray(o.T_world_object);
-    const { rotation, size } = partsOf(T, o.world_units);
-    const at = this.centre.clone().applyMatrix4(T);
-    const angles = new Euler().setFromQuaternion(rotation);
-    at.toArray().forEach((x, i) => (this.position[i]!.value = tidy(x)));
-    [angles.x, angles.y, angles.z].forEach((a, i) => (this.rotation[i]!.value = tidy(MathUtils.radToDeg(a))));
-    this.scale.value = tidy(size);
+    this.frames = frames;
+    this.placement = placementOf(o, this.centreOf(o.id));
+    this.fields.forEach((field, i) => field.show(this.placement!.numbers[i]!));
   }
 
   private place(): void {
-    const o = this.object;
-    const numbers = [...this.position, ...this.rotation, this.scale].map((i) => i.valueAsNumber);
-    if (!o || numbers.some((x) => !Number.isFinite(x)) || this.scale.valueAsNumber <= 0) return;
-    const T = new Matrix4().fromArray(o.T_world_object);
-    const { stretch, size } = partsOf(T, o.world_units);
-    const angles = this.rotation.map((i) => MathUtils.degToRad(i.valueAsNumber));
-    const rotation = new Quaternion().setFromEuler(new Euler(angles[0], angles[1], angles[2]));
-    const moved = new Matrix4()
-      .compose(new Vector3(), rotation, stretch.multiplyScalar(this.scale.valueAsNumber / size))
-      .multiply(new Matrix4().makeTranslation(this.centre.clone().negate()));
-    const at = new Vector3(...this.position.map((i) => i.valueAsNumber));
-    moved.premultiply(new Matrix4().makeTranslation(at));
-    this.send(setTransformMatrix(this.id, localMatrix(moved, this.parent, o.world_units).toArray()));
-    this.object = { ...o, T_world_object: moved.toArray() };
+    const numbers = this.fields.map((field) => field.value);
+    if (!this.object || !this.frames || !this.placement) return;
+    if (numbers.some((x) => !Number.isFinite(x)) || numbers[6]! <= 0) return;
+    this.placement = placedAnew(this.placement, numbers, this.object, this.centreOf(this.id), this.frames);
+    this.send(setTransformMatrix(this.id, this.placement.T_parent_object));
+    this.sentUntil_ms = performance.now() + CONFIRM_MS;
   }
 }
 
@@ -96,9 +124,13 @@ function parentFrame(o: ObjectState, frames: Frames): Matrix4 {
   return parent ? new Matrix4().fromArray(parent.T_world_object).multiply(shrunk(parent.world_units)) : new Matrix4();
 }
 
-function partsOf(T: Matrix4, worldUnits: number): { rotation: Quaternion; stretch: Vector3; size: number } {
+/** A point of the mesh in units of the object. */
+const inObject = (o: ObjectState, point: Vector3): Vector3 =>
+  point.clone().applyMatrix4(new Matrix4().fromArray(o.T_object_mesh));
+
+function partsOf(T: Matrix4, worldUnits: number): { rotation: Quaternion; size: number } {
   const rotation = new Quaternion();
   const stretch = new Vector3();
   T.decompose(new Vector3(), rotation, stretch);
-  return { rotation, stretch, size: Math.cbrt(Math.abs(stretch.x * stretch.y * stretch.z)) / worldUnits };
+  return { rotation, size: Math.cbrt(Math.abs(stretch.x * stretch.y * stretch.z)) / worldUnits };
 }
