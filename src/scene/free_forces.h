@@ -40,8 +40,8 @@ struct OwnedForce {
 
   ClientId owner = 0;
   T value;
-  Nanos goneAt = kNever;    ///< when it has ended or ramped out
-  bool outOfWorld = false;  ///< ramps out since a reset ended its world: stays on the device
+  Nanos goneAt = kNever;       ///< when it has ended or ramped out
+  bool outOfWorld = false;     ///< ramps out since a reset ended its world: stays on the device
   Nanos untoldSince = kNever;  ///< no snapshot has its start or its ramp yet; kNever: one has
 
   /// Of a force that started, or ramps out from now on.
