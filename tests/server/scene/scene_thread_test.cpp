@@ -139,6 +139,18 @@ TEST_F(SceneOfTwoDevices, PausesBetweenBuildsForBoth) {
   }
 }
 
+// The servo counts from the publication, which comes later for the second: the description has one time.
+TEST_F(SceneOfTwoDevices, IsTheSameForBothWhileTimedForcesRun) {
+  start(300'000);
+  for (int i = 0; i < 40 && !HasFailure(); ++i) {
+    send(scene::DefineEffect{"constant", i % 4, 0, 1, 300, 0, {}, scene::Vec3(1, 0, 0)});
+    send(scene::StartEffect{i % 4});
+    sendShape(static_cast<float>(i));
+    runFor(i % 7 * 11 * kMs);
+    expectOneDescription();
+  }
+}
+
 // A bound of one of them is not that of the device under whose name the client is told.
 TEST_F(SceneOfTwoDevices, TextsOfOneOfThemNameIt) {
   const scene::DefineEffect spring{"spring", 0, 1e9, 1, 0, 0, {}, {}};
