@@ -1,5 +1,6 @@
 // hapticd device-host: runs one driver in its own process (the isolation host). Started by the server, not by
 // people.
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -18,7 +19,13 @@ void addDeviceHost(CLI::App& app) {
   command->add_option("config", *text, "Configuration with exactly one device, as TOML")->required();
   command->callback([text] {
     const server::DeviceConfig config = server::parseConfig(*text, "configuration").devices.front();
-    const auto device = server::makeDevice(config);
+    std::unique_ptr<device::Device> device;
+    try {
+      device = server::makeDevice(config);
+    } catch (const std::exception& error) {  // a file that the server has read may have changed since
+      exitCode = device::refuseDeviceHost(error.what());
+      return;
+    }
     realtime::setUpThread({.realtime = false});  // locks the memory of the process
     exitCode = device::runDeviceHost(
         *device,

@@ -40,7 +40,8 @@ struct RecordingFacts {
 
 void add(RecordingFacts& facts, const record::TickEvent& event) {
   const realtime::TickReport& report = event.tick.report;
-  if (facts.first == 0) facts.first = report.time;
+  // Of several devices, those of one are read before the earlier ones of the next.
+  if (facts.first == 0 || report.time < facts.first) facts.first = report.time;
   facts.last = std::max(facts.last, report.time);
   DeviceFacts& device = facts.devices.at(event.device);
   ++device.ticks;

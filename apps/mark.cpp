@@ -38,7 +38,7 @@ int run(const MarkOptions& options) {
     if (arrival.kind == wire::kindOf<wire::Marker>) {
       const auto marker = wire::decode<wire::Marker>(arrival.bytes);
       confirmed = confirmed || (marker && marker->text.text == options.text);
-    } else if (arrival.kind == wire::kindOf<wire::Text>) {
+    } else if (arrival.kind == wire::kindOf<wire::Text> && arrival.sender == device) {
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
       const std::string heard = base::printable(text->text.text);

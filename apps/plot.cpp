@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -68,13 +69,24 @@ std::uint32_t deviceNamed(const record::RecordingHeader& header, const std::stri
   throw std::runtime_error("the recording has no device '" + name + "'; it has " + known);
 }
 
+// The first tick of any device: seconds count from it, as those of 'hapticd info' do.
+base::Nanos beginOf(const std::string& recording) {
+  record::RecordingReader reader(recording);
+  std::optional<base::Nanos> first;
+  for (record::RecordingEvent event; reader.next(event);) {
+    if (const auto* tick = std::get_if<record::TickEvent>(&event))
+      first = std::min(first.value_or(tick->tick.report.time), tick->tick.report.time);
+  }
+  return first.value_or(0);
+}
+
 Data read(const PlotOptions& options) {
   record::RecordingReader reader(options.recording);
   const std::uint32_t device = deviceNamed(reader.header(), options.device);
   Data data;
   data.device = base::printable(reader.header().devices[device].names.front());
   data.title = options.recording.substr(options.recording.rfind('/') + 1) + ", " + data.device;
-  base::Nanos first = 0;
+  const base::Nanos first = beginOf(options.recording);
   std::uint32_t trips = 0;
   std::vector<std::pair<base::Nanos, std::string>> markers;
   for (record::RecordingEvent event; reader.next(event);) {
@@ -83,7 +95,6 @@ Data read(const PlotOptions& options) {
     const auto* tick = std::get_if<record::TickEvent>(&event);
     if (tick == nullptr || tick->device != device) continue;
     const realtime::TickReport& report = tick->tick.report;
-    if (first == 0) first = report.time;
     const double time_s = base::toSeconds(report.time - first);
     if (time_s < options.from_s || (options.to_s > 0 && time_s > options.to_s)) continue;
     const realtime::Rendering& r = report.rendering;

@@ -164,6 +164,7 @@ class ServerRecording {
   bool poll() {
     link_.poll(20ms, [this](const client::Arrival& arrival) {
       if (arrival.what != client::Arrival::What::message || arrival.kind != wire::kindOf<wire::Text>) return;
+      if (arrival.sender != device_) return;  // another device of the server
       const auto text = wire::decode<wire::Text>(arrival.bytes);
       if (!text) return;
       const std::string heard = base::printable(text->text.text);

@@ -63,7 +63,7 @@ class Similarity {
 }  // namespace
 
 FreeForces::FreeForces(const SceneConfig& config)
-    : config_(config), bound_(config), clock_(config.clock ? config.clock : config.stopwatch) {}
+    : config_(config), bound_(config), stopwatch_(config.stopwatch) {}
 
 void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos now) {
   entry.owner = client;
@@ -284,13 +284,14 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double
 }
 
 // The servo starts and ramps by its own clock, from the tick that is given this publication. Large meshes in
-// it take longer to build than many a force lasts.
+// it take longer to build than many a force lasts. All builders of a scene count from one time: a recording
+// that begins meanwhile describes the forces by one of them.
 void FreeForces::beginInServo(Nanos now) {
   Nanos told = kNever;  // read once, and only for a force that ends: recordings keep each reading
   const auto tell = [&](auto& owned) {
     const Nanos since = std::exchange(owned.untoldSince, kNever);
     if (since == kNever || owned.goneAt == kNever) return Nanos{0};
-    if (told == kNever) told = std::max(now, clock_ ? clock_() : now);
+    if (told == kNever) told = std::max(now, stopwatch_ ? stopwatch_() : now);
     owned.goneAt += told - since;
     return told - since;
   };

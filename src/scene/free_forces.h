@@ -186,7 +186,7 @@ class FreeForces {
   std::uint32_t fieldNumbers_ = 0;  // the same for fields
   LastCommands asked_;              // of all but effects, also of forces that are gone
   LastCommands askedOfConstraint_;
-  const std::function<Nanos()> clock_;
+  const std::function<Nanos()> stopwatch_;
   Nanos updatedAt_ = 0;
   double heaviestSurface_Ns_per_m_ = 0;  // of objects, when last published
   double worldUnitsPerMetre_ = 1000;     // then

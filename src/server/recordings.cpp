@@ -320,7 +320,7 @@ void Recordings::poll() {
     }
     constexpr Nanos kLongestTick = 100'000'000;
     return std::all_of(stations_.begin(), stations_.end(),
-                       [&](const auto& station) { return station->finishedAt() > entry->at + kLongestTick; });
+                       [&](const auto& station) { return station->finishedAfter(entry->at + kLongestTick); });
   });
 }
 

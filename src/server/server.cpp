@@ -540,6 +540,7 @@ void Server::checkHeartbeat(Session& session, Nanos now) {
                                     "because the scene is behind; its forces ramp out",
                                     session.id()));
       for (const auto& scene : scenes_) scene->releaseForces(session.id());
+      for (const auto& station : stations_) station->endStreams(session.id());
       break;
   }
 }
@@ -556,9 +557,12 @@ void Server::onPeerGone(Session& session, const std::string& reason) {
 
 void Server::onHeartbeatAgain(Session& session) {
   for (const auto& scene : scenes_) scene->restoreForces(session.id());
-  deliver(*scenes_.front(),
-          {{session.id(), scene::Notice::Severity::warning,
-            "Heartbeat: none came through for 5 s, and your forces ramped out; they act again"}});
+  session.send(
+      session.nameOfTexts(),
+      wire::Text{.severity = wire::kTextWarning,
+                 .level = 0,
+                 .text = "Heartbeat: none came through for 5 s, and your forces ramped out; they act again"});
+  session.flush();
 }
 
 Station* Server::stationOf(wire::LocalSender name) noexcept {

@@ -35,7 +35,7 @@ void Server::onMessage(Session& session, const wire::MessageReceived& message, N
   if (message.kind == wire::kindOf<wire::Identify>) return onIdentify(session, message);
   if (station == nullptr) return;
   // They act for a moment after their receipt, however late the server reads them.
-  if (session.peerGone() &&
+  if ((session.peerGone() || session.forcesEnded()) &&
       (message.kind == wire::kindOf<wire::RemoteContacts> || message.kind == wire::kindOf<wire::HeldForce>))
     return;
   if (!mayCommand(session, *station, message)) return;

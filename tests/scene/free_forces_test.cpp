@@ -150,7 +150,7 @@ class ForcesOfLongPublications : public Forces {
 
   static SceneConfig config() {
     SceneConfig config;
-    config.clock = [] { return end_; };
+    config.stopwatch = [] { return end_; };
     return config;
   }
   void publishFor(Nanos time) {

@@ -50,7 +50,7 @@ class SceneTest : public ::testing::Test {
   explicit SceneTest(SceneConfig config = {}) : builder_(simulated(std::move(config))) { publish(); }
 
   static SceneConfig simulated(SceneConfig config) {
-    config.stopwatch = [] { return Nanos{0}; };
+    if (!config.stopwatch) config.stopwatch = [] { return Nanos{0}; };
     config.checkMeshes = false;
     return config;
   }

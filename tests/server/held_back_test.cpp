@@ -432,6 +432,44 @@ TEST_F(HeldBackTest, AClientWithoutAHeartbeatInALongPauseFeelsNothingUntilTheNex
       client->untilText("Heartbeat: none came through for 5 s, and your forces ramped out; they act again"));
 }
 
+// What it streams ends, too. The text is one of a device that it uses: stock clients ignore others.
+TEST_F(HeldBackTest, AClientOfTheSecondDeviceFeelsAndHearsOfItsHeartbeats) {
+  server::ServerConfig config = RunningServer::anyPort();
+  config.devices.push_back(config.devices.front());
+  config.devices.back().names = {"Second"};
+  const RunningServer server(config);
+  ScriptedPeer client(server.address(), "Second");
+  const auto untilFelt = [&](const std::function<bool(double)>& felt) {
+    return client.until([&] {
+      client.send(wire::HeldForce{.time = 0, .force = {0, 1, 0}, .torque = {}, .lifetime = 0.1});
+      const auto force = client.last<wire::Force>();
+      return force && felt(norm(force->force));
+    });
+  };
+  ASSERT_TRUE(client.until([&] { return client.count<wire::IsTouching>() > 0; }));
+  client.send(wire::Heartbeat{1});
+  ASSERT_TRUE(untilFelt([](double force_N) { return force_N > 0.95; }));
+  EXPECT_TRUE(untilFelt([&](double force_N) {
+    return force_N < 0.01 && lines_.text().find("no heartbeat came through for 5 s") != std::string::npos;
+  })) << lines_.text();
+  const std::size_t ticks = client.count<wire::IsTouching>() + 300;
+  EXPECT_TRUE(untilFelt([&](double force_N) {
+    EXPECT_LT(force_N, 0.01);
+    return client.count<wire::IsTouching>() > ticks;
+  }));
+  client.send(wire::Heartbeat{1});
+  EXPECT_TRUE(client.until([&] {
+    const std::vector<wire::Text> texts = client.all<wire::Text>();
+    return std::any_of(texts.begin(), texts.end(), [](const wire::Text& text) {
+      return text.text.text.ends_with("your forces ramped out; they act again");
+    });
+  }));
+  EXPECT_TRUE(untilFelt([&](double force_N) {
+    client.queue(wire::Heartbeat{1});
+    return force_N > 0.95;
+  }));
+}
+
 TEST_F(HeldBackTest, CommandsSentBeforeAClientDisconnectsAreApplied) {
   auto client = peer();
   closeScene();

@@ -130,6 +130,11 @@ std::string receive() {
 
 }  // namespace
 
+int refuseDeviceHost(const std::string& reason) {
+  send("-" + reason);
+  return 1;
+}
+
 int runDeviceHost(Device& device, const DeviceHostOptions& options) {
   // Signals concern the server, which then ends this process in order; so does its death.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGTTOU, SIGPIPE}) {
@@ -140,8 +145,7 @@ int runDeviceHost(Device& device, const DeviceHostOptions& options) {
     try {
       device.open();
     } catch (const std::exception& error) {
-      send(std::string("-") + error.what());
-      return 1;
+      return refuseDeviceHost(error.what());
     }
     DeviceTraits traits = device.traits();
     const Nanos life = commandLife(base::toNanos(1 / options.rate_Hz));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "device/device.h"
 
@@ -15,5 +16,8 @@ struct DeviceHostOptions {
 /// Serves this device, not yet open, to the IsolatedDevice that started the process, until that goes away;
 /// leaves no force behind. The result is for main() to return.
 int runDeviceHost(Device& device, const DeviceHostOptions& options = {});
+
+/// In its place where there is no device to serve: tells the IsolatedDevice why.
+int refuseDeviceHost(const std::string& reason);
 
 }  // namespace hapticd::device

@@ -10,6 +10,7 @@ std::unique_ptr<Device> make(const DriverOptions& options) {
   ReplayOptions own;
   own.file = options.hand;
   own.repeat = true;
+  HandFile::load(own.file);  // a wrong one is a mistake in the configuration
   return std::make_unique<ReplayDevice>(own);
 }
 

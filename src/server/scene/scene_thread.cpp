@@ -12,14 +12,10 @@ namespace {
 
 constexpr base::Nanos kCollectAfter = 50'000'000;
 
-// Deduplicate notices: every device's builder emits the same ones.
-void mergeNotices(std::vector<scene::Notice>&& from, std::vector<scene::Notice>& into) {
-  for (scene::Notice& notice : from) {
-    const auto same = [&](const scene::Notice& known) {
-      return known.client == notice.client && known.text == notice.text;
-    };
-    if (std::none_of(into.begin(), into.end(), same)) into.push_back(std::move(notice));
-  }
+bool has(const std::vector<scene::Notice>& notices, const scene::Notice& notice) {
+  return std::any_of(notices.begin(), notices.end(), [&](const scene::Notice& known) {
+    return known.client == notice.client && known.text == notice.text;
+  });
 }
 
 void lowerTo(std::optional<base::Nanos>& next, std::optional<base::Nanos> at) {
@@ -138,21 +134,35 @@ void SceneThread::apply(SceneTask&& task) {
   auto* command = std::get_if<scene::SceneCommand>(&task.what);
   if (callbacks_.applying) callbacks_.applying(task.client, now, command);
   const std::uint64_t resets = seats_.front().builder.resets();
-  std::vector<scene::Notice> repeated;
   for (std::size_t i = seats_.size(); i-- > 0;) {
-    scene::SceneBuilder& builder = seats_[i].builder;
+    auto& [device, builder, notices] = seats_[i];
     if (command == nullptr) {
       builder.clientGone(task.client, now);
     } else if (i > 0) {
-      builder.apply(task.client, scene::SceneCommand(*command), now, repeated);
+      builder.apply(task.client, scene::SceneCommand(*command), now, notices);
     } else {
-      builder.apply(task.client, std::move(*command), now, notices_);
+      builder.apply(task.client, std::move(*command), now, notices);
     }
   }
-  mergeNotices(std::move(repeated), notices_);
+  takeNotices(true);
   if (seats_.front().builder.resets() != resets && callbacks_.wasReset) callbacks_.wasReset();
   // Not after ReleaseForces, which overtakes: what the client sent before it must not be felt.
   if (command == nullptr && owners) owners->forget(task.client);
+}
+
+// What all devices say is said once; what only some say, such as a bound, names them. `again`: also what
+// waits to be said already.
+void SceneThread::takeNotices(bool again) {
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    for (scene::Notice notice : seats_[i].notices) {
+      const bool ofAll = std::all_of(seats_.begin(), seats_.end(),
+                                     [&](const Seat& seat) { return has(seat.notices, notice); });
+      if (ofAll && i > 0) continue;
+      if (!ofAll) notice.text += " (device '" + seats_[i].device.name + "')";
+      if (again || !has(notices_, notice)) notices_.push_back(std::move(notice));
+    }
+  }
+  for (Seat& seat : seats_) seat.notices.clear();
 }
 
 // Builders delay the publication of a mesh until its edits have paused.
@@ -184,6 +194,7 @@ void SceneThread::publish() {
       spdlog::error("the scene could not be published: {}", error.what());
     }
   }
+  takeNotices(false);
   if (!notices_.empty() && callbacks_.notices) callbacks_.notices(std::exchange(notices_, {}));
 }
 
@@ -212,20 +223,18 @@ void SceneThread::inspect() {
 }
 
 void SceneThread::publishTo(Seat& seat, base::Nanos now) {
-  std::vector<scene::Notice> notices;
   std::shared_ptr<const scene::SceneSnapshot> snapshot;
   // First, so that the builder can refit the index that the servo returned instead of building a new one.
   seat.device.slot->collect();
   stopwatch_.beginBuilder();
   try {
-    snapshot = seat.builder.publish(now, notices);
+    snapshot = seat.builder.publish(now, seat.notices);
   } catch (...) {
     if (seat.device.publishing) seat.device.publishing(now, 0, stopwatch_.given());
     throw;
   }
   if (seat.device.publishing)
     seat.device.publishing(now, snapshot ? snapshot->revision : 0, stopwatch_.given());
-  mergeNotices(std::move(notices), notices_);
   if (!snapshot) return;
   seat.device.slot->publish(snapshot);
   collectAt_ = base::now() + kCollectAfter;

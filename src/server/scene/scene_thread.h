@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/thread.h"
@@ -24,6 +25,7 @@ struct SceneDevice {
   /// Scene thread; called before a snapshot is passed to the slot, with the time at which the builder was
   /// asked, the revision that it returned, 0 for none, and its readings of stopwatch and clock. May be empty.
   std::function<void(base::Nanos, std::uint64_t, const std::vector<base::Nanos>&)> publishing;
+  std::string name = {};  ///< for texts about one of several devices
 };
 
 /// Owns one scene and its thread: one builder for each device, because workspace and passivity bound differ;
@@ -65,6 +67,7 @@ class SceneThread {
   struct Seat {
     SceneDevice device;
     scene::SceneBuilder builder;
+    std::vector<scene::Notice> notices = {};  // of the command or publication at hand
   };
   struct PublishWaiter {
     base::Nanos since;  // edits up to this time must be published
@@ -78,6 +81,7 @@ class SceneThread {
   void noteFailure(scene::ClientId client, const char* reason) noexcept;
   void publish();
   void publishTo(Seat& seat, base::Nanos now);
+  void takeNotices(bool again);
   void describeScene();
   void inspect();
   std::optional<base::Nanos> oldestEdit() const;

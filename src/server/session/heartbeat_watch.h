@@ -38,6 +38,9 @@ class HeartbeatWatch {
     return std::exchange(ended_, std::nullopt).has_value();
   }
 
+  /// Whether the client's forces were ended, and no heartbeat has arrived since.
+  bool ended() const noexcept { return ended_.has_value(); }
+
   /// The server stops reading from the client.
   void pause(base::Nanos now) noexcept {
     if (!paused_) paused_ = now;

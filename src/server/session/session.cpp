@@ -217,15 +217,17 @@ void Session::refuse(const std::string& reason) {
   }
 }
 
-// Stock clients print only texts of devices that they use, so it comes from one.
+// Stock clients print only texts of devices that they use.
+wire::LocalSender Session::nameOfTexts() const noexcept {
+  if (!subscriptions_.empty()) return *subscriptions_.begin();
+  return wire::LocalSender{names_.senders().size() > 1 ? 1 : 0};
+}
+
 void Session::sendLastText(const std::string& reason) {
   if (!greeted_ || !failure_.empty()) return;
-  const bool named = names_.senders().size() > 1;
-  const wire::LocalSender from =
-      subscriptions_.empty() ? wire::LocalSender{named ? 1 : 0} : *subscriptions_.begin();
   drainPeer();
   wire::FrameEncoder encoder;  // the protocol's state may be the failure
-  encoder.add(clock_.now(), from,
+  encoder.add(clock_.now(), nameOfTexts(),
               wire::Message(wire::Text{
                   .severity = wire::kTextError, .level = 0, .text = reason + "; the connection ends"}));
   net::Buffer bytes;

@@ -84,6 +84,8 @@ class Session {
   bool wants(wire::LocalSender name) const noexcept;
   /// How many of the server's devices the client has described so far.
   std::size_t namesWanted() const noexcept { return subscriptions_.size(); }
+  /// For texts about the connection: a device that the client uses.
+  wire::LocalSender nameOfTexts() const noexcept;
   const net::Endpoint& remote() const noexcept { return connection_.remote(); }
   /// The client's IPv4 address, without the port.
   std::string address() const { return connection_.remote().addressText(); }
@@ -158,6 +160,8 @@ class Session {
   void reportLost();
   /// Checks the client's heartbeats.
   HeartbeatWatch::Verdict checkHeartbeat(base::Nanos now) noexcept { return heartbeats_.check(now); }
+  /// Whether that has ended the client's forces: they act again after a heartbeat.
+  bool forcesEnded() const noexcept { return heartbeats_.ended(); }
   /// The server itself stood still until `now`: silence counts from here.
   void excuseStall(base::Nanos now) noexcept { heartbeats_.excuseStall(now); }
   /// Closes the connection; `reason` is for the log. onClosed() follows.

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cctype>
 #include <ctime>
+#include <span>
 #include <system_error>
 
 #include "base/wall_offset.h"
 #include "base/world.h"
+#include "record/crc32.h"
 #include "record/export.h"
 
 namespace hapticd::server {
@@ -30,8 +32,10 @@ std::string plain(std::string text) {
   return text;
 }
 
-// Percent-encoded, so that each device has a folder of its own.
+// Percent-encoded, so that each device has a folder of its own; a long one is cut, because file systems take
+// 255 bytes, and ends with the checksum of the name.
 std::string folderOf(const std::string& device) {
+  constexpr std::size_t kLongest = 200;
   std::string folder;
   for (const unsigned char c : device) {
     if (isPlain(c)) {
@@ -40,7 +44,8 @@ std::string folderOf(const std::string& device) {
       folder += fmt::format("%{:02X}", c);
     }
   }
-  return folder;
+  if (folder.size() <= kLongest) return folder;
+  return folder.substr(0, kLongest) + fmt::format("%{:08X}", record::crc32(std::as_bytes(std::span(device))));
 }
 
 // Whether the name is one that nextFile() makes.

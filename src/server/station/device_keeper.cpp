@@ -159,12 +159,15 @@ void DeviceKeeper::reopen() noexcept {
   try {
     stopLoop();
     device_.close();
+    closed_.store(true, std::memory_order_release);
     if (ending_) return;
     device_.open();
+    closed_.store(false, std::memory_order_release);
     startLoop();
   } catch (const std::exception& error) {
     refusal = error.what();
     device_.close();
+    closed_.store(true, std::memory_order_release);
   }
   openError_ = refusal;
 }

@@ -45,6 +45,8 @@ class DeviceKeeper {
   /// Whether forces were stopped after a suspension of the machine since the last call.
   bool takeResumed() noexcept { return watchdog_.takeResumed(); }
 
+  /// Any thread: no loop runs, and the device is closed, or is being opened.
+  bool isClosed() const noexcept { return closed_.load(std::memory_order_acquire); }
   /// Whether the thread of the loop has realtime scheduling.
   bool realtime() const noexcept { return realtime_; }
 
@@ -76,6 +78,7 @@ class DeviceKeeper {
   std::string attemptText_;  // reported while the attempt runs
   base::Thread attempt_;
   std::atomic<bool> ending_{false};
+  std::atomic<bool> closed_{false};
   std::atomic<bool> attemptDone_{false};
   // Errors of the last attempts to open and to calibrate; empty after success. Owned by the attempt until
   // attemptDone_.

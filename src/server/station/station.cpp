@@ -23,10 +23,15 @@ std::unique_ptr<device::Device> placeholderFor(const record::RecordedDevice& rec
   return std::make_unique<device::SimulatedDevice>(options);
 }
 
+// One of several may fail.
 std::unique_ptr<device::Device> openDevice(const DeviceConfig& config) {
   auto device = makeDevice(config);
-  device->open();
-  if (config.calibrate && !device->traits().calibratesInLoop) device->calibrate();
+  try {
+    device->open();
+    if (config.calibrate && !device->traits().calibratesInLoop) device->calibrate();
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error("device '" + config.names.front() + "': " + error.what());
+  }
   return device;
 }
 
@@ -139,7 +144,8 @@ Station::Station(const DeviceConfig& config, std::vector<DeviceName> names, Scen
                                 if (impl.recording == nullptr) return;
                                 impl.recording->recordPublish(impl.recordedAs, now, revision, readings);
                                 impl.showEdits();
-                              }};
+                              },
+                          .name = impl.config.names.front()};
   sceneDevice.config.limits = sceneLimits(scene.limits());
   impl.recordedScene = sceneDevice.config;
   impl.recordedOptions = tickOptions(impl.config, *impl.device);
@@ -200,8 +206,8 @@ void Station::Impl::showEdits() noexcept {
   unshown = nullptr;
 }
 
-base::Nanos Station::finishedAt() const noexcept {
-  return impl_->tick.finishedAt();
+bool Station::finishedAfter(base::Nanos time) const noexcept {
+  return impl_->keeper.isClosed() || impl_->tick.finishedAt() > time;
 }
 
 Station::~Station() {
@@ -366,7 +372,19 @@ bool Station::Impl::takeTicks(const WallClock& wallClock) {
     alerts.clear();
     any = outbox.collect() || any;
   });
-  return any;
+  return tellOfStop(wallClock) || any;
+}
+
+// No tick tells what was done to a device that is closed. It acts from the first one on.
+bool Station::Impl::tellOfStop(const WallClock& wallClock) {
+  constexpr std::uint32_t kStopped = realtime::bit(realtime::Trip::stopped);
+  const bool stopped = tick.control().stopped();
+  realtime::TickReport last = outbox.last();
+  if (!keeper.isClosed() || last.tick == 0 || last.guard.stopped == stopped) return false;
+  last.guard.stopped = stopped;
+  last.guard.active = stopped ? last.guard.active | kStopped : last.guard.active & ~kStopped;
+  outbox.add(last, frame, wallClock.at(base::now()), true);
+  return outbox.collect();
 }
 
 bool Station::report(const WallClock& clock, const Sessions& clients) {

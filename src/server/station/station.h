@@ -55,12 +55,12 @@ class Station {
   /// The device as a recording describes it.
   record::RecordedDevice recorded() const;
   /// Scene thread, or before it starts: records the scene and the ticks as the device of this number; null:
-  /// ends. The recorder must live until finishedAt() is later than the end, or the servo has ended.
+  /// ends. The recorder must live until finishedAfter() the end, or the servo has ended.
   /// `builder`: of the device, where the recording begins while the servo runs.
   void recordTo(record::Recorder* recording, std::uint32_t number,
                 const scene::SceneBuilder* builder = nullptr);
-  /// Any thread: when the last tick ended; 0 before the first.
-  base::Nanos finishedAt() const noexcept;
+  /// Any thread: a tick has ended after this time, or no loop runs.
+  bool finishedAfter(base::Nanos time) const noexcept;
 
   SceneHost& scene() noexcept;
   bool has(wire::LocalSender name) const noexcept;

@@ -38,6 +38,7 @@ struct Station::Impl {
   void onPublished(const std::shared_ptr<const scene::SceneSnapshot>& snapshot);
   void showEdits() noexcept;
   bool takeTicks(const WallClock& wallClock);
+  bool tellOfStop(const WallClock& wallClock);
   void serveFirst(const Sessions& clients);
   /// The rate that a client gets; none, with a text to it, when it asks for one that is no rate.
   std::optional<double> chosenRate(const Request& request, double wanted_Hz, double present_Hz,

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -50,7 +51,14 @@ class SceneOfTwoDevices : public testing::Test {
     std::vector<SceneDevice> devices;
     for (auto& slot : slots_)
       devices.push_back({.config = {}, .slot = &slot, .published = {}, .publishing = {}});
-    thread_ = std::make_unique<SceneThread>(std::move(devices), SceneThread::Callbacks{});
+    devices.front().name = "Left";
+    devices.back().name = "Right";
+    devices.back().config.servoPeriod_s *= ofTheSecond;
+    SceneThread::Callbacks callbacks;
+    callbacks.notices = [this](std::vector<scene::Notice>&& notices) {
+      for (const scene::Notice& notice : notices) texts.push_back(notice.text);
+    };
+    thread_ = std::make_unique<SceneThread>(std::move(devices), std::move(callbacks));
     thread_->start();
     send(scene::SetSurfaceProperty{0, "stiffness", 1});
     runFor(0);
@@ -93,6 +101,9 @@ class SceneOfTwoDevices : public testing::Test {
     EXPECT_EQ(all[0], all[1]);
   }
 
+  double ofTheSecond = 1;  // its servo period as a multiple of the first one's
+  std::vector<std::string> texts;
+
  private:
   base::SimulatedClock clock_;
   PassingTime time_{clock_};
@@ -126,6 +137,48 @@ TEST_F(SceneOfTwoDevices, PausesBetweenBuildsForBoth) {
     expectOneDescription();
     runFor(30 * kMs);
   }
+}
+
+// The servo counts from the publication, which comes later for the second: the description has one time.
+TEST_F(SceneOfTwoDevices, IsTheSameForBothWhileTimedForcesRun) {
+  start(300'000);
+  for (int i = 0; i < 40 && !HasFailure(); ++i) {
+    send(scene::DefineEffect{"constant", i % 4, 0, 1, 300, 0, {}, scene::Vec3(1, 0, 0)});
+    send(scene::StartEffect{i % 4});
+    sendShape(static_cast<float>(i));
+    runFor(i % 7 * 11 * kMs);
+    expectOneDescription();
+  }
+}
+
+// A bound of one of them is not that of the device under whose name the client is told.
+TEST_F(SceneOfTwoDevices, TextsOfOneOfThemNameIt) {
+  const scene::DefineEffect spring{"spring", 0, 1e9, 1, 0, 0, {}, {}};
+  const scene::SetSurfaceProperty ofNoObject{7, "stiffness", 1};
+  const std::string lowered = "would be unstable on this device and is lowered";
+  const std::string refused = "there is no such object; call setObjectNumber or addObject first";
+  const auto ends = [](const std::string& text, const std::string& end) { return text.ends_with(end); };
+
+  ofTheSecond = 2;
+  start(0);
+  send(spring);
+  send(ofNoObject);
+  runFor(kMs);
+  ASSERT_EQ(texts.size(), 3U);
+  EXPECT_PRED2(ends, texts[0], lowered + " (device 'Left')");
+  EXPECT_PRED2(ends, texts[1], lowered + " (device 'Right')");
+  EXPECT_PRED2(ends, texts[2], refused);
+
+  TearDown();
+  texts.clear();
+  ofTheSecond = 1;
+  start(0);
+  send(spring);
+  send(ofNoObject);
+  runFor(kMs);
+  ASSERT_EQ(texts.size(), 2U) << "what is the same for both is said once";
+  EXPECT_PRED2(ends, texts[0], lowered);
+  EXPECT_PRED2(ends, texts[1], refused);
 }
 
 }  // namespace

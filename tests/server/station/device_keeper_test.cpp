@@ -342,12 +342,14 @@ TEST_P(KeeperTest, ReportsAFailureToOpenAndRetriesEveryTwoSeconds) {
     now += 2000 * kMs;
     EXPECT_THAT(keeper_.poll(now), refused) << "the old error stays until the new attempt ends";
     EXPECT_THAT(faultAt(now), refused);
+    EXPECT_TRUE(keeper_.isClosed());
   }
   expectNoLoop();
   device_.refuse("");
   keeper_.poll(now + 2000 * kMs);
   EXPECT_EQ(faultAt(now + 2001 * kMs), "");
   EXPECT_TRUE(loopRuns());
+  EXPECT_FALSE(keeper_.isClosed());
   EXPECT_EQ(device_.opens, 5);
 }
 

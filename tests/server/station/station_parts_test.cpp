@@ -532,13 +532,15 @@ TEST_F(BlackBoxFilesTest, KeepsTheNewestAlsoAfterTheClockWasSetBack) {
 
 TEST_F(BlackBoxFilesTest, DevicesOfAnyNameHaveFoldersOfTheirOwn) {
   realtime::BlackBox box(5);
-  for (const char* name : {"Left hand", "Left_hand", "\u5de6", "\u53f3"}) {
+  const std::string longest(93, ' ');  // three characters each
+  for (const std::string& name : {std::string("Left hand"), std::string("Left_hand"), std::string("\u5de6"),
+                                  std::string("\u53f3"), longest + "1", longest + "2"}) {
     BlackBoxRecorder recorder(name, {directory_, 2}, box);
     fail(box, 2);
     recorder.poll();
     recorder.finish();
   }
-  EXPECT_EQ(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()), 4);
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()), 6);
   EXPECT_TRUE(fs::exists(directory_ / "Left%20hand"));
 }
 
