@@ -292,8 +292,10 @@ void FreeForces::beginInServo(Nanos now) {
     const Nanos since = std::exchange(owned.untoldSince, kNever);
     if (since == kNever || owned.goneAt == kNever) return Nanos{0};
     if (told == kNever) told = std::max(now, stopwatch_ ? stopwatch_() : now);
-    owned.goneAt += told - since;
-    return told - since;
+    // A recording dates the publication of the scene that it begins with before what describes it.
+    const Nanos later = std::max<Nanos>(told - since, 0);
+    owned.goneAt += later;
+    return later;
   };
   for (auto& [index, entry] : effects_) entry.value.startedAt += tell(entry);
   for (auto& entry : leavingEffects_) tell(entry);

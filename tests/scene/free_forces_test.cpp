@@ -143,6 +143,19 @@ TEST_F(Forces, ARunningEffectGoesOnWithAnotherDuration) {
   EXPECT_TRUE(scene_->effects.empty());
 }
 
+// A recording that begins while the server runs dates the publication of its scene before the description.
+TEST_F(Forces, OneThatGoesOnInARecordingEndsWhenItDid) {
+  say(constant(1, 300));
+  say(ContinueEffect{1, 100 * kMillisecond});
+  now_ -= 200 * kMillisecond;
+  publish();
+  now_ += 200 * kMillisecond;
+  run(240 * kMillisecond);
+  EXPECT_EQ(scene_->effects.size(), 1U);
+  run(20 * kMillisecond);
+  EXPECT_TRUE(scene_->effects.empty());
+}
+
 // A publication takes as long as its meshes: the servo is given all of it when it is over.
 class ForcesOfLongPublications : public Forces {
  protected:
