@@ -154,10 +154,10 @@ void FreeForces::handle(DefineEffect& c, const Call& call) {
 }
 
 // The definition may travel by UDP and arrive after the start.
-void FreeForces::start(std::int32_t index, Nanos at, const Call& call) {
+void FreeForces::start(std::int32_t index, Nanos at, Nanos untoldSince, const Call& call) {
   const auto known = effects_.find(index);
   if (known != effects_.end() && !known->second.value.effect.releasing) {
-    start(known->second, call.client, at, call.now);
+    start(known->second, call.client, at, untoldSince);
     tellOfSum_.insert(call.client);
     return;
   }
@@ -170,13 +170,14 @@ void FreeForces::start(std::int32_t index, Nanos at, const Call& call) {
 
 template <>
 void FreeForces::handle(StartEffect& c, const Call& call) {
-  start(c.index, call.now, call);
+  start(c.index, call.now, call.now, call);
 }
 
+// It runs in the servo already.
 template <>
 void FreeForces::handle(ContinueEffect& c, const Call& call) {
   constexpr Nanos kLongestAgo = Nanos{1} << 60U;
-  start(c.index, call.now - std::clamp<Nanos>(c.ran_ns, 0, kLongestAgo), call);
+  start(c.index, call.now - std::clamp<Nanos>(c.ran_ns, 0, kLongestAgo), kNever, call);
 }
 
 template <>

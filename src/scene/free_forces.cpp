@@ -65,7 +65,7 @@ class Similarity {
 FreeForces::FreeForces(const SceneConfig& config)
     : config_(config), bound_(config), stopwatch_(config.stopwatch) {}
 
-void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos now) {
+void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos untoldSince) {
   entry.owner = client;
   entry.value.running = true;
   entry.value.startedAt = at;
@@ -73,8 +73,8 @@ void FreeForces::start(Owned<RunningEffect>& entry, ClientId client, Nanos at, N
   entry.value.effect.releasing = false;
   entry.value.effect.owner = ownerOf(client);
   const Nanos duration = entry.value.effect.duration;
-  entry.untoldSince = kNever;
-  entry.endAt(duration > 0 ? at + duration + kAfterEnd : kNever, now);
+  entry.goneAt = duration > 0 ? at + duration + kAfterEnd : kNever;
+  entry.untoldSince = untoldSince;
   changed_ = true;
 }
 

@@ -143,8 +143,8 @@ class FreeForces {
   std::shared_ptr<const ForceOwner> ownerOf(ClientId client) const {
     return config_.owners ? config_.owners->of(client) : nullptr;
   }
-  void start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos now);
-  void start(std::int32_t index, Nanos at, const Call& call);
+  void start(Owned<RunningEffect>& entry, ClientId client, Nanos at, Nanos untoldSince);
+  void start(std::int32_t index, Nanos at, Nanos untoldSince, const Call& call);
   void beginInServo(Nanos now);
   template <class F>
   void release(const F& whose, Nanos now, bool endsWorld);

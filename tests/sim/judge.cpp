@@ -71,7 +71,9 @@ void Judge::onRead(Nanos now, Nanos clock, bool delivered, const device::DeviceS
     latch("the hand was too fast");
     waitForCalm_ = true;
   }
-  if (speed < limits_.calmSpeed_m_per_s) waitForCalm_ = false;
+  // Nobody knows how a faulty device moves.
+  const bool known = (state.hold & device::kHoldFault) == 0;
+  if (known && speed < limits_.calmSpeed_m_per_s) waitForCalm_ = false;
   if (waitForCalm_) holdReason_ = "the hand is too fast";
 }
 

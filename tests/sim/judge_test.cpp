@@ -17,6 +17,8 @@ class SwallowedHand : public testing::Test {
       now_ += kTick;
       device::DeviceState state;
       state.position_m = position_m;
+      state.velocity_m_per_s = velocity_m_per_s_;
+      state.hold = hold_;
       judge_.onRead(now_, now_, true, state);
       judge_.onWrite(now_, force_N, true);
     }
@@ -27,7 +29,11 @@ class SwallowedHand : public testing::Test {
     tick({0.004, 0.018, 0}, {0, 0.5, 0}, 100);
   }
 
+  void rearm() { judge_.onRearm(now_); }
+
   std::vector<std::string> findings_;
+  Vec3 velocity_m_per_s_ = Vec3::Zero();  // as the device tells it
+  std::uint32_t hold_ = device::kHoldNone;
 
  private:
   Nanos now_ = 0;
@@ -66,6 +72,27 @@ TEST_F(SwallowedHand, may_follow_when_it_came_back_over_the_top) {
   tick({0, 0.018, -0.0241}, Vec3::Zero(), 2);
   tick({0, 0.015, 0}, {0, 0, -0.5}, 100);
   press();
+  tick({0.004, 0.015, 0}, Vec3::Zero(), 60);
+  EXPECT_EQ(findings_.size(), 1U);
+}
+
+// It was too fast, and gets no force until a device without a fault has told that it is slow.
+TEST_F(SwallowedHand, is_not_one_that_only_a_faulty_device_called_slow) {
+  press();
+  velocity_m_per_s_ = {0, 0, 2};
+  tick({0.004, 0.025, 0}, Vec3::Zero(), 5);
+  velocity_m_per_s_ = Vec3::Zero();
+  hold_ = device::kHoldFault;
+  tick({0.004, 0.025, 0}, Vec3::Zero(), 5);
+  velocity_m_per_s_ = {0, 0, 0.6};
+  hold_ = device::kHoldNone;
+  tick({0.004, 0.025, 0}, Vec3::Zero());
+  rearm();
+  tick({0.004, 0.025, 0}, Vec3::Zero(), 600);
+  tick({0.004, 0.015, 0}, Vec3::Zero(), 60);
+  EXPECT_TRUE(findings_.empty()) << findings_[0];
+  velocity_m_per_s_ = Vec3::Zero();
+  tick({0.004, 0.025, 0}, Vec3::Zero(), 600);
   tick({0.004, 0.015, 0}, Vec3::Zero(), 60);
   EXPECT_EQ(findings_.size(), 1U);
 }
