@@ -2,16 +2,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <tuple>
 #include <utility>
 
 #include "realtime/render/enclosure.h"
 #include "realtime/render/proxy.h"
 #include "realtime/render/renderer.h"
+#include "realtime/render/stiffness_blend.h"
 
 namespace hapticd::realtime {
 namespace {
 
+using geometry::Box;
 using geometry::Mat3;
 
 constexpr int kMaxPushes = 16;
@@ -110,12 +113,22 @@ bool Proxy::surfacesNearChanged() const noexcept {
       !std::equal(now.planes.begin(), now.planes.end(), before.planes.begin(), before.planes.end(),
                   samePlane))
     return true;
-  for (int i = 0; i < query_.objectCount(); ++i) {
-    const scene::ObjectState* const present = query_.object(i).state;
-    const scene::ObjectState* const past = before.find(present->id);
-    if (past == nullptr || !(past->surface == present->surface) ||
-        past->mesh->topology != present->mesh->topology || past->motion.jumps() != present->motion.jumps())
-      return true;
+  // Of all objects, because what the query has found near depends on the boxes of the index. Those that stay
+  // are the same in both scenes.
+  const double reach = 2 * blendReach(toolRadius_, contactSet_);  // was wider when the spring was longer
+  const auto isNear = [&](const SceneAtTime& at, const scene::ObjectState& object) {
+    const Affine T_device_object = at.scene->workspace.T_device_world * object.motion.at(at.time);
+    const Box& box = object.mesh->indexAt(at.time).bounds();
+    return !scene::partNear(box, std::span(&T_device_object, 1), position_, reach).empty();
+  };
+  for (std::size_t i = 0; i < now.objects.size(); ++i) {
+    const scene::ObjectState& present = *now.objects[i];
+    const scene::ObjectState& past = *before.objects[i];
+    if (&present == &past) continue;
+    if (present.id != past.id) return true;
+    const bool same = past.surface == present.surface && past.mesh->topology == present.mesh->topology &&
+                      past.motion.jumps() == present.motion.jumps();
+    if (!same && (isNear(now_, present) || isNear(before_, past))) return true;
   }
   return false;
 }

@@ -411,4 +411,8 @@ BlendedSpring blendedSpring(const SceneAtTime& now, const ContactQuery& query, c
   return out;
 }
 
+double blendReach(double toolRadius_m, const ContactSet& contactSet) noexcept {
+  return Width((contactSet.normal_m + contactSet.lateral_m).norm()).value + toolRadius_m;
+}
+
 }  // namespace hapticd::realtime

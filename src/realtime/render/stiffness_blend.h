@@ -28,4 +28,7 @@ struct BlendedSpring {
 BlendedSpring blendedSpring(const SceneAtTime& now, const ContactQuery& query, const PlacedPlanes& planes,
                             double toolRadius_m, const Vec3& proxy, const ContactSet& contactSet) noexcept;
 
+/// How far from the proxy the surfaces are that take part, to the centre of a ball.
+double blendReach(double toolRadius_m, const ContactSet& contactSet) noexcept;
+
 }  // namespace hapticd::realtime

@@ -410,6 +410,34 @@ TEST_F(StiffnessTest, several_stiff_neighbours_do_not_add_up) {
   EXPECT_GT(largestBeside, 0.99 * kStiffest) << "nothing was limited";
 }
 
+// What is near takes part in a deep spring from farther away than the tick looks for contact.
+TEST_F(StiffnessTest, a_neighbour_that_a_command_changes_is_told_as_far_as_it_takes_part) {
+  constexpr double kTold_N = 0.1;
+  int steps = 0;
+  for (double beside = 0.001; beside < 0.036; beside += 0.001) {
+    scene = SceneFixture();
+    addPlane(Vec3::UnitZ(), 0, 1000);
+    scene::ObjectState& other = addPlate(Vec3::Zero(), Vec3::UnitX(), Vec3::UnitZ(), 1000);
+    scene::ObjectState& far = addPlate({0.1, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 1000);
+    addPlate({0.2, 0, 0}, Vec3::UnitX(), Vec3::UnitZ(), 1000);
+    Hand hand(scene.snapshot());
+    hand.at({-beside, 0, 0.001});
+    for (int i = 1; i <= 40; ++i) hand.at({-beside, 0, -0.0005 * i});
+    far.surface = surface(100);
+    hand.show(scene.snapshot());
+    EXPECT_EQ(hand.at({-beside, 0, -0.020}).status, 0U) << beside;
+    const Vec3 before = hand.now().force_N;
+    other.surface = surface(100);
+    hand.show(scene.snapshot());
+    const Rendering& r = hand.at({-beside, 0, -0.020});
+    const double step_N = (r.force_N - before).norm();
+    if (std::abs(step_N - kTold_N) < 0.1 * kTold_N) continue;
+    EXPECT_EQ(r.status, step_N > kTold_N ? kRenderGeometryJump : 0U) << beside << " " << step_N;
+    steps += step_N > kTold_N ? 1 : 0;
+  }
+  EXPECT_GT(steps, 20);
+}
+
 // Millimetres and other transforms of the same scene give the same force.
 TEST_F(StiffnessTest, blend_does_not_depend_on_the_unit) {
   std::array<Vec3, 2> force;
