@@ -94,6 +94,8 @@ test("another device shows nothing of the one before", async () => {
   await viewer.page.fill("#mark-text", "of all");
   await viewer.page.press("#mark-text", "Enter");
   await viewer.until("the marker", () => viewer.ask("viewer.plots.marks.some((m) => m.label === 'of all')"));
+  // A loaded machine makes ticks late, whichever device it is.
+  const marks = () => viewer.ask("viewer.plots.marks.map((m) => m.label).filter((label) => label !== 'late')");
   // What the page says of the guard and of the force, whenever it says something else.
   const said = viewer.ask(`new Promise((resolve) => {
     const said = new Set();
@@ -111,13 +113,13 @@ test("another device shows nothing of the one before", async () => {
     tick();
   })`);
   assert.deepEqual((await said).filter((text) => /stopped|A client stopped/.test(text)), []);
-  assert.deepEqual(await viewer.ask("viewer.plots.marks.map((m) => m.label)"), ["of all"]);
+  assert.deepEqual(await marks(), ["of all"]);
   assert.equal(await viewer.ask("document.querySelector('#stage').dataset.held"), "");
   // Back at A the stop stands, and is no new one.
   await viewer.page.selectOption("#device", "A");
   await viewer.until("the stop of A", async () => (await viewer.text("#guard")).includes("Stopped: no force until re-armed."));
   await viewer.until("STOPPED", () => viewer.ask("viewer.tick && document.querySelector('#stage').dataset.held === 'STOPPED'"));
-  assert.deepEqual(await viewer.ask("viewer.plots.marks.map((m) => m.label)"), ["of all"]);
+  assert.deepEqual(await marks(), ["of all"]);
   await end(viewer, server);
 });
 

@@ -59,7 +59,10 @@ TEST(Drivers, ValuesThatADriverDoesNotAcceptAreNamed) {
   EXPECT_EQ(refusalOf("forcedimension", {.hardware = "1"}), "");
   EXPECT_EQ(refusalOf("replay", {}),
             R"(replay needs a recorded hand: hand = "FILE.csv", or --hand FILE.csv)");
-  EXPECT_EQ(refusalOf("replay", {.hand = "hand.csv"}), "");
+  const std::string file = testing::TempDir() + "drivers_test_replay.csv";
+  std::ofstream(file) << "t_s,x_m,y_m,z_m\n0,0,0,0\n";
+  EXPECT_EQ(refusalOf("replay", {.hand = file}), "");
+  std::remove(file.c_str());
 }
 
 TEST(Drivers, KeysOfTheirOwnAreKnown) {
