@@ -377,6 +377,7 @@ void Server::onHaplyWarning(scene::ClientId client, const std::string& text) {
 
 ServerStatus Server::status() const {
   ServerStatus status;
+  status.run = std::to_string(started_);
   status.uptime_s = base::toSeconds(base::now() - started_);
   status.recording = recordings_.file();
   if (player_) status.replay = player_->status();

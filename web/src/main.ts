@@ -21,7 +21,7 @@ import { type Quantity, rampCss, rangeOf } from "./scene3d/colours";
 import { View } from "./scene3d/view";
 import { REFUSAL, TRIPS } from "./server_tables";
 import { pollServers } from "./servers";
-import { Meshes, pollState, Starts } from "./state";
+import { Meshes, pollState } from "./state";
 import type { DeviceState, ObjectState, SceneState, ServerState } from "./state_types";
 import { effectNames, feltForces, nameOfObject, type RemoteContact } from "./sources";
 import { startTheme } from "./theme";
@@ -48,7 +48,6 @@ class Page {
   private readonly tripAt_ms = new Map<string, number>();
   private tickIsNew = false;
   private readoutAt_ms = 0;
-  private readonly starts = new Starts();
   private serverResponds = true;
   /** A stop was sent, and the server has not reported it yet. */
   private stopUnconfirmed = false;
@@ -217,7 +216,8 @@ class Page {
     this.showLink();
     if (!state && this.state) this.clearReadout();
     if (state) {
-      if (this.starts.isAnother(state.server.uptime_s)) this.forgetScene();
+      // Started anew, it has another scene.
+      if (this.state && this.state.server.run !== state.server.run) this.forgetScene();
       this.state = state;
       this.showDevices(state.devices);
       const device = state.devices.find((d) => d.name === this.deviceChoice.value) ?? state.devices[0];

@@ -31,25 +31,6 @@ export function decodeMesh(bytes: ArrayBuffer): DisplayMesh {
   };
 }
 
-/** Rounding of an uptime, and the way of a state. */
-const START_TOLERANCE_S = 5;
-
-/** Tells a server from the one before it at this address, which had another scene. */
-export class Starts {
-  private uptime_s = -Infinity;
-  /** When it started, on two clocks of this machine: one may be set, the other stands still while the machine sleeps. */
-  private start_s: [number, number] = [Infinity, Infinity];
-
-  isAnother(uptime_s: number): boolean {
-    const start_s: [number, number] = [Date.now() / 1000 - uptime_s, performance.now() / 1000 - uptime_s];
-    const isLater = start_s.every((s, i) => s > this.start_s[i]! + START_TOLERANCE_S);
-    const isAnother = uptime_s < this.uptime_s || isLater;
-    this.uptime_s = uptime_s;
-    this.start_s = start_s;
-    return isAnother;
-  }
-}
-
 /** The state, or undefined. On a slow network that of many objects takes seconds: it is given up when nothing more of it comes. */
 async function fetchState(): Promise<ServerState | undefined> {
   const request = new AbortController();

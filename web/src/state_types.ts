@@ -150,7 +150,7 @@ export interface SceneState {
 }
 
 export interface ServerState {
-  server: { version: string; uptime_s: number; recording: string | null; replay: ReplayState | null };
+  server: { version: string; run: string; uptime_s: number; recording: string | null; replay: ReplayState | null };
   devices: DeviceState[];
   clients: ClientState[];
   scenes: SceneState[];

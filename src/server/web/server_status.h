@@ -12,6 +12,7 @@
 namespace hapticd::server {
 
 struct ServerStatus {
+  std::string run;  ///< another one for each start on this machine
   double uptime_s = 0;
   std::string recording;               ///< file name; empty: not recording
   std::optional<ReplayStatus> replay;  ///< empty: live

@@ -245,6 +245,7 @@ std::string stateJson(const StateReport& report) {
   }
   return textOf({{"server",
                   {{"version", report.version},
+                   {"run", server.run},
                    {"uptime_s", server.uptime_s},
                    {"recording", server.recording.empty() ? Json() : Json(server.recording)},
                    {"replay", json(server.replay)}}},

@@ -96,6 +96,7 @@ TEST_F(Web, TheStateHasEveryFieldThePageReads) {
 
   EXPECT_EQ(state["server"]["version"].get<std::string>().empty(), false);
   EXPECT_GT(state["server"]["uptime_s"], 0);
+  EXPECT_NE(state["server"]["run"].get<std::string>(), "");
   EXPECT_TRUE(state["server"]["recording"].is_null());
 
   const json& device = state["devices"].at(0);

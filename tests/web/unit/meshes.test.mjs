@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bundled } from "../bundled.mjs";
 
-const { Meshes, pollState, Starts } = await bundled("state.ts");
+const { Meshes, pollState } = await bundled("state.ts");
 
 /** A triangle as GET /api/mesh gives it. */
 function answer() {
@@ -139,29 +139,4 @@ test("a state that takes long is waited for while it comes, and given up when it
   await soon();
   assert.deepEqual(states.slice(1), [undefined]);
   [globalThis.window, globalThis.setTimeout, globalThis.clearTimeout] = before;
-});
-
-test("a server that was started anew is another one, and one whose clock or ours was set is not", () => {
-  const before = [Date.now, performance.now];
-  let [date, monotonic] = [1e12, 5000];
-  Date.now = () => date;
-  performance.now = () => monotonic;
-  const passes = (ms) => ((date += ms), (monotonic += ms));
-  const starts = new Starts();
-  assert.equal(starts.isAnother(100), false, "the first");
-  passes(1000);
-  assert.equal(starts.isAnother(101.2), false);
-  date += 3600e3; // the clock was set
-  assert.equal(starts.isAnother(101.4), false);
-  date -= 7200e3;
-  assert.equal(starts.isAnother(101.4), false);
-  date += 600e3; // this machine slept
-  assert.equal(starts.isAnother(701.4), false);
-  passes(1000);
-  assert.equal(starts.isAnother(3), true);
-  passes(1000);
-  assert.equal(starts.isAnother(4), false);
-  passes(3600e3);
-  assert.equal(starts.isAnother(1800), true, "the other one had run for longer than the first before it was seen");
-  [Date.now, performance.now] = before;
 });
