@@ -288,23 +288,15 @@ PublishedForces FreeForces::publish(Nanos now, double worldUnitsPerMetre, double
 // that begins meanwhile describes the forces by one of them.
 void FreeForces::beginInServo(Nanos now) {
   Nanos told = kNever;  // read once, and only for a force that ends: recordings keep each reading
-  const auto tell = [&](auto& owned) {
+  forEachForce([&](auto& owned) {
     const Nanos since = std::exchange(owned.untoldSince, kNever);
-    if (since == kNever || owned.goneAt == kNever) return Nanos{0};
+    if (since == kNever || owned.goneAt == kNever) return;
     if (told == kNever) told = std::max(now, stopwatch_ ? stopwatch_() : now);
     // A recording dates the publication of the scene that it begins with before what describes it.
     const Nanos later = std::max<Nanos>(told - since, 0);
     owned.goneAt += later;
-    return later;
-  };
-  for (auto& [index, entry] : effects_) entry.value.startedAt += tell(entry);
-  for (auto& entry : leavingEffects_) tell(entry);
-  for (auto& [index, entry] : planes_) tell(entry);
-  for (auto& entry : leavingFields_) tell(entry);
-  if (planeDetail_) tell(*planeDetail_);
-  if (field_) tell(*field_);
-  if (constraint_) tell(*constraint_);
-  if (buzz_) tell(*buzz_);
+    if constexpr (requires { owned.value.startedAt; }) owned.value.startedAt += later;
+  });
 }
 
 // By their owners, whichever client sent the command.
