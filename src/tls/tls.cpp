@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "net/connection_impl.h"
-#include "tls/handshakes.h"
 
 namespace hapticd::tls {
 namespace {
@@ -204,7 +203,7 @@ Progress handshake(SSL* ssl) {
 
 // Where a server computes its handshakes, and where it goes on with the result.
 struct Elsewhere {
-  std::shared_ptr<Handshakes> handshakes;  // null: a client, which computes them at once
+  std::shared_ptr<base::Worker> handshakes;  // null: a client, which computes them at once
   net::Loop* loop = nullptr;
 };
 
@@ -350,11 +349,12 @@ class TlsConnection final : public net::Connection::Impl, public std::enable_sha
   }
 
   // Until the result is here, nothing else touches what OpenSSL knows of the connection. A job for one that
-  // is gone does nothing.
+  // is gone does nothing. One that finds no memory leaves the peer without an answer: it is disconnected as
+  // one that never greets.
   void shake() {
     if (!elsewhere_.handshakes) return goOn(handshake(ssl_.get()));
     shaking_ = true;
-    elsewhere_.handshakes->post(
+    elsewhere_.handshakes->postFor(
         stream_.remote().address,
         [weak = weak_from_this(), waiting = std::weak_ptr(ssl_), loop = elsewhere_.loop] {
           const auto ssl = waiting.lock();
@@ -479,7 +479,7 @@ net::Connection wrap(const Context& context, net::Connection stream) {
 }
 
 Acceptor::Acceptor(Context context, net::Loop& loop)
-    : context_(std::move(context)), loop_(loop), handshakes_(std::make_shared<Handshakes>()) {}
+    : context_(std::move(context)), loop_(loop), handshakes_(std::make_shared<base::Worker>("tls")) {}
 
 Acceptor::~Acceptor() {
   handshakes_->stop();

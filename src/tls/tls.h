@@ -5,12 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "base/worker.h"
 #include "net/connection.h"
 #include "net/loop.h"
 
 namespace hapticd::tls {
-
-class Handshakes;
 
 /// A certificate or key that cannot be used; the text names the file and the remedy.
 class Error : public net::Error {
@@ -70,7 +69,7 @@ class Acceptor {
  private:
   const Context context_;
   net::Loop& loop_;
-  const std::shared_ptr<Handshakes> handshakes_;
+  const std::shared_ptr<base::Worker> handshakes_;
 };
 
 }  // namespace hapticd::tls

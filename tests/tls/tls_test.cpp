@@ -18,7 +18,6 @@
 #include "base/fake_world.h"
 #include "net/loop.h"
 #include "net/tcp_listener.h"
-#include "tls/handshakes.h"
 
 namespace hapticd::tls {
 namespace {
@@ -272,30 +271,6 @@ TEST_F(TlsTest, OnlySoManyNewKeysAreMadeForAClient) {
   client.askForKeys(1000);
   ASSERT_TRUE(until([&] { return server_.ended.has_value(); }));
   EXPECT_EQ(*server_.ended, "the peer asks for new TLS keys again and again");
-}
-
-TEST(Handshakes, AreComputedInTurnByAddressUntilTheyStop) {
-  const base::World& real = base::world();
-  base::SimulatedClock clock;
-  base::FakeThreads threads(clock);
-  const base::ScopedWorld world({real.clock, threads, real.files, real.random});
-  std::string order;
-  Handshakes handshakes;
-  const auto post = [&](std::uint32_t address, char name) {
-    handshakes.post(address, [&order, name] { order += name; });
-  };
-  for (const char name : {'a', 'b', 'c', 'd'}) post(7, name);
-  post(9, 'X');
-  post(5, 'Y');
-  handshakes.post(9, [] { throw std::bad_alloc(); });
-  post(9, 'Z');
-  threads.runDue();
-  EXPECT_EQ(order, "YaXbcZd");
-  post(7, 'e');
-  handshakes.stop();
-  post(7, 'f');
-  threads.runDue();
-  EXPECT_EQ(order, "YaXbcZd");
 }
 
 TEST_F(TlsTest, AnUnfinishedHandshakeHoldsABoundedAmount) {

@@ -1,5 +1,7 @@
 #include "server/web/mesh_store.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
 
@@ -81,7 +83,8 @@ void MeshStore::build(const Key& key, Entry& entry, const scene::ObjectDescripti
         if (*cancelled) return;
         loop_.post([this, key, geometry, share, bytes] { onBuilt(key, geometry, share, std::move(*bytes)); });
       },
-      [this, key, cancelled = entry.cancelled] {
+      [this, key, cancelled = entry.cancelled](const std::exception& error) {
+        spdlog::error("web: {}", error.what());
         if (*cancelled) return;
         loop_.post([this, key, cancelled] {
           if (!*cancelled) forget(key);

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/worker.h"
 #include "net/http_message.h"
 #include "net/loop.h"
 #include "server/web/scene_watch.h"
-#include "server/web/worker.h"
 
 namespace hapticd::server {
 
@@ -21,7 +21,7 @@ class MeshStore {
  public:
   using Respond = std::function<void(net::HttpResponse)>;
 
-  MeshStore(net::Loop& loop, Worker& worker) : loop_(loop), worker_(worker) {}
+  MeshStore(net::Loop& loop, base::Worker& worker) : loop_(loop), worker_(worker) {}
   ~MeshStore();
 
   /// Responds with the mesh of the object at `position` in `observed`, or with 503 when building it takes
@@ -50,7 +50,7 @@ class MeshStore {
   void onBuilt(const Key& key, std::uint64_t geometry, std::size_t share, net::Buffer&& bytes);
 
   net::Loop& loop_;
-  Worker& worker_;
+  base::Worker& worker_;
   std::map<Key, Entry> entries_;
 };
 

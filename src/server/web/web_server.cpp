@@ -224,7 +224,8 @@ void WebServer::answer() {
         for (const Asker& asker : *askers) send(asker, responses.at(asker.format));
         next();
       },
-      [askers, send, next] {
+      [askers, send, next](const std::exception& error) {
+        spdlog::error("web: {}", error.what());
         for (const Asker& asker : *askers) send(asker, errorResponse(503, kNoMemory));
         next();
       });

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/worker.h"
 #include "base/world.h"
 #include "net/http_server.h"
 #include "server/web/access.h"
@@ -13,7 +14,6 @@
 #include "server/web/server_list.h"
 #include "server/web/server_status.h"
 #include "server/web/state_report.h"
-#include "server/web/worker.h"
 
 namespace hapticd::server {
 
@@ -80,8 +80,8 @@ class WebServer {
   base::Nanos cost_ = 0;  // of this thread, for it
   base::Nanos nextReport_ = 0;
   net::Subscription reportTimer_;
-  Worker textWorker_{"web-text"};
-  Worker meshWorker_{"web-mesh"};
+  base::Worker textWorker_{"web-text"};
+  base::Worker meshWorker_{"web-mesh"};
   SceneWatch watch_;
   MeshStore meshes_;
   ServerList servers_;
