@@ -4,6 +4,7 @@
 
 #include "geometry/gap_tolerance.h"
 #include "geometry/mesh_check.h"
+#include "scene/notice.h"
 
 namespace hapticd::scene {
 namespace {
