@@ -73,10 +73,16 @@ void exportVrpn(const ExportOptions& options, std::string& remark) {
   }
   for (record::RecordingEvent event; reader.next(event);) {
     throwIfStopped();
-    const auto* tick = std::get_if<record::TickEvent>(&event);
-    if (tick == nullptr) continue;
-    const realtime::TickReport& report = tick->tick.report;
-    addReports(devices[tick->device], report, stamp(report.time + reader.wallOffsetAt(report.time)), log);
+    if (const auto* tick = std::get_if<record::TickEvent>(&event)) {
+      const realtime::TickReport& report = tick->tick.report;
+      addReports(devices[tick->device], report, stamp(report.time + reader.wallOffsetAt(report.time)), log);
+    } else if (const auto* marker = std::get_if<record::MarkerEvent>(&event)) {
+      const wire::Time time = stamp(marker->time + reader.wallOffsetAt(marker->time));
+      for (const ReportedDevice& device : devices) {
+        for (const wire::LocalSender name : device.names)
+          log.add(time, name, wire::Marker{.time = marker->time, .text = marker->text});
+      }
+    }
   }
   log.close();
   remark = reader.remark();
@@ -155,7 +161,7 @@ void addExport(CLI::App& app) {
   command->add_flag("--force", options->force, kForceText);
   command->add_flag("--json", options->json, kJsonText);
   command->footer(
-      "mcap  ticks, poses, guard and scene commands, for Foxglove and other readers of MCAP\n"
+      "mcap  ticks, poses, guard, scene commands and markers, for Foxglove and other readers of MCAP\n"
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
       "vrpn  the reports that a client would have received; VRPN clients open it as "
       "Phantom@file:///path/to/the.vrpn\n"

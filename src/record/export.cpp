@@ -40,6 +40,23 @@ constexpr const char* kPoseSchema =
     R"("orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},)"
     R"("z":{"type":"number"},"w":{"type":"number"}}}}}}})";
 
+// It lists these.
+constexpr const char* kLogSchema =
+    R"({"title":"foxglove.Log","type":"object","properties":{)"
+    R"("timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},)"
+    R"("level":{"type":"integer"},"message":{"type":"string"},"name":{"type":"string"},"file":{"type":"string"},)"
+    R"("line":{"type":"integer"}}})";
+constexpr int kInformation = 2;  // a level of it
+
+// The time of a message, in a field of its own.
+void appendTimestamp(std::string& out, JsonObject& message, Nanos wall_ns) {
+  constexpr Nanos kSecond = 1'000'000'000;
+  message.key("timestamp");
+  JsonObject time(out);
+  time("sec", wall_ns / kSecond);
+  time("nsec", wall_ns % kSecond);
+}
+
 void appendCoordinates(std::string& out, const double* values, const char* names) {
   JsonObject object(out);
   for (int i = 0; names[i] != 0; ++i) object(std::string(1, names[i]).c_str(), values[i]);
@@ -63,7 +80,9 @@ McapFile::McapFile(const std::filesystem::path& file, Unfinished unfinished)
       poseSchema_(writer_.addSchema("foxglove.PoseInFrame", kPoseSchema)),
       guardSchema_(writer_.addSchema("hapticd.Guard", kGuardSchema)),
       commandSchema_(writer_.addSchema("hapticd.SceneCommand", kCommandSchema)),
-      commands_(writer_.addChannel(commandSchema_, "/scene/commands")) {}
+      logSchema_(writer_.addSchema("foxglove.Log", kLogSchema)),
+      commands_(writer_.addChannel(commandSchema_, "/scene/commands")),
+      markers_(writer_.addChannel(logSchema_, "/markers")) {}
 
 McapFile::Channels& McapFile::channelsOf(const std::string& device) {
   const auto known = devices_.find(device);
@@ -92,16 +111,10 @@ void McapFile::add(const Sample& sample) {
 }
 
 void McapFile::addPose(std::uint16_t channel, const Sample& sample, const Vec3& position) {
-  constexpr Nanos kSecond = 1'000'000'000;
   text_.clear();
   {
     JsonObject object(text_);
-    object.key("timestamp");
-    {
-      JsonObject time(text_);
-      time("sec", sample.time_ns / kSecond);
-      time("nsec", sample.time_ns % kSecond);
-    }
+    appendTimestamp(text_, object, sample.time_ns);
     object("frame_id", sample.device);
     object.key("pose");
     JsonObject pose(text_);
@@ -140,6 +153,20 @@ void McapFile::addCommand(const SceneEvent& event, Nanos wall_ns) {
   writer_.add(commands_, wall_ns, text_);
 }
 
+void McapFile::addMarker(const std::string& text, Nanos wall_ns) {
+  text_.clear();
+  {
+    JsonObject object(text_);
+    appendTimestamp(text_, object, wall_ns);
+    object("level", kInformation);
+    object("message", text);
+    object("name", std::string("marker"));
+    object("file", std::string());
+    object("line", 0);
+  }
+  writer_.add(markers_, wall_ns, text_);
+}
+
 void exportRecording(const std::filesystem::path& file, SampleFile& to, std::string& remark,
                      const std::function<void()>& beforeEach) {
   RecordingReader reader(file);
@@ -151,6 +178,8 @@ void exportRecording(const std::filesystem::path& file, SampleFile& to, std::str
                       reader.wallOffsetAt(tick->tick.report.time)));
     } else if (const auto* command = std::get_if<SceneEvent>(&event)) {
       to.addCommand(*command, command->time + reader.wallOffsetAt(command->time));
+    } else if (const auto* marker = std::get_if<MarkerEvent>(&event)) {
+      to.addMarker(marker->text, marker->time + reader.wallOffsetAt(marker->time));
     }
   }
   remark = reader.remark();

@@ -25,6 +25,8 @@ class SampleFile {
   virtual void add(const Sample& sample) = 0;
   /// A scene command of a client, or its end; `wall_ns` since 1970. Some kinds of file leave it out.
   virtual void addCommand(const SceneEvent& /*event*/, Nanos /*wall_ns*/) {}
+  /// A moment that a client marked; likewise.
+  virtual void addMarker(const std::string& /*text*/, Nanos /*wall_ns*/) {}
   virtual void close() = 0;
 };
 
@@ -41,12 +43,13 @@ class CsvFile final : public SampleFile {
 };
 
 /// For each device the ticks, HIP and proxy as poses that Foxglove draws, and the trips of the guard; for the
-/// scenes, their commands.
+/// scenes, their commands; and the markers as lines of a log, which Foxglove lists.
 class McapFile final : public SampleFile {
  public:
   explicit McapFile(const std::filesystem::path& file, Unfinished unfinished = Unfinished::kept);
   void add(const Sample& sample) override;
   void addCommand(const SceneEvent& event, Nanos wall_ns) override;
+  void addMarker(const std::string& text, Nanos wall_ns) override;
   void close() override { writer_.close(); }
 
  private:
@@ -60,8 +63,8 @@ class McapFile final : public SampleFile {
   void addGuard(Channels& channels, const Sample& sample);
 
   McapWriter writer_;
-  std::uint16_t tickSchema_, poseSchema_, guardSchema_, commandSchema_;
-  std::uint16_t commands_;
+  std::uint16_t tickSchema_, poseSchema_, guardSchema_, commandSchema_, logSchema_;
+  std::uint16_t commands_, markers_;
   std::map<std::string, Channels> devices_;
   std::string text_;
 };

@@ -57,6 +57,9 @@ for hand in my heard; do
   [ ! -s "$work/error.txt" ] || { cat "$work/error.txt"; exit 1; }
 done
 "$hapticd" export "$work/my.haptics" --to vrpn -o "$work/my.vrpn"
+for part in 'hapticd Marker' 'nääää'; do
+  grep -qaF "$part" "$work/my.vrpn" || { echo "no '$part' in the log"; exit 1; }
+done
 "$hapticd" export "$work/my.haptics" --to mcap -o "$work/my.mcap"
 [ "$(head -c 5 "$work/my.mcap" | tail -c 4)" = MCAP ]
 if [ -n "$stock" ]; then

@@ -19,6 +19,7 @@ fi
 serve_options=(--http off --record "$work/my.haptics")
 source "$source_dir/tests/apps/server.sh"
 "$hapticd" touch "$source_dir/testdata/meshes/bunny.obj" --server "Phantom@tcp://$address" --seconds 3 >"$work/touch.txt"
+"$hapticd" mark 'trial "3" begins' --server "Phantom@tcp://$address"
 kill -INT "$server"
 wait "$server" || true
 "$hapticd" export "$work/my.haptics" --to mcap -o "$work/my.mcap"

@@ -33,6 +33,7 @@ const schemas = new Map([...reader.schemasById.values()].map((s) => [s.name, JSO
 
 const counts = new Map();
 const ticks = [];
+const markers = [];
 let last = 0n;
 for await (const message of reader.readMessages()) {
   const topic = topics.get(message.channelId);
@@ -41,6 +42,7 @@ for await (const message of reader.readMessages()) {
   if (message.logTime < last) fail(`time goes back at ${topic}`);
   last = message.logTime;
   if (topic.endsWith("/tick")) ticks.push(value);
+  if (topic === "/markers") markers.push(value);
   if (topic.endsWith("/hip") && value.pose.position.x === undefined) fail("a pose without a position");
 }
 await handle.close();
@@ -55,6 +57,9 @@ const complete = ticks.find((tick) => tick.touching); // a free one has no conta
 if (JSON.stringify(properties) !== JSON.stringify(Object.keys(complete))) fail(`schema ${properties}`);
 if (!schemas.has("foxglove.PoseInFrame")) fail("no poses");
 if (!(counts.get("/scene/commands") > 0)) fail("no scene commands");
+if (JSON.stringify(markers.map((m) => m.message)) !== '["trial \\"3\\" begins"]') fail(`markers ${JSON.stringify(markers)}`);
+const stated = Object.keys(schemas.get("foxglove.Log").properties);
+if (JSON.stringify(stated) !== JSON.stringify(Object.keys(markers[0]))) fail(`schema of a log: ${stated}`);
 
 // The same numbers as in the CSV, tick by tick.
 const [header, ...rows] = (await readFile(csvFile, "utf8")).trim().split("\n").map((line) => line.split(","));
