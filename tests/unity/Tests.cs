@@ -2,6 +2,7 @@
 //   Tests.exe HOST:PORT
 using System;
 using System.Collections.Generic;
+using System.Net.Sockets;
 using System.Text;
 using System.Threading;
 using Hapticd;
@@ -345,9 +346,14 @@ static class Tests
         Check(Refusal<ArgumentException>(() => new HapticClient("Phantom")).Contains("'Phantom'"), "no host");
         Check(Refusal<ArgumentException>(() => new HapticClient("P@h:x")).Contains("P@h:x"), "no port");
         string none = Refusal<ConnectException>(() => new HapticClient("Nobody@" + address, 1000));
-        Check(none.Contains("no device 'Nobody'"), none);
+        Check(none.Contains("no device 'Nobody'; it has Phantom"), none);
         string nowhere = Refusal<ConnectException>(() => new HapticClient("Phantom@127.0.0.1:1", 1000));
         Check(nowhere.Contains("127.0.0.1:1") && nowhere.Contains("hapticd serve"), nowhere);
+        TcpListener silent = new TcpListener(System.Net.IPAddress.Loopback, 0);
+        silent.Start();
+        string nothing = Refusal<ConnectException>(() => new HapticClient("Phantom@" + silent.LocalEndpoint, 300));
+        Check(nothing.Contains("is this a VRPN server?"), nothing);
+        silent.Stop();
         using (HapticClient client = Client())
         {
             Action<string, Action> refused = (part, action) =>

@@ -92,7 +92,9 @@ namespace Hapticd
             Start(Write, "hapticd-write");
             if (!heard.WaitOne(timeout_ms))
             {
-                string why = ended ?? "the server has no device '" + device + "'";
+                string why = ended ?? (peer.Connected
+                    ? "the server has no device '" + device + "'; it has " + peer.Devices
+                    : "no answer in " + timeout_ms + " ms: is this a VRPN server?");
                 End(why);
                 throw new ConnectException(server + ": " + why);
             }

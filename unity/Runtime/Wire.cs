@@ -119,6 +119,7 @@ namespace Hapticd
         const int SenderDescription = -1;
         const int TypeDescription = -2;
         const int LowestType = -2000;
+        const string NoDevice = "VRPN Control";  // a sender of every server
 
         readonly string device;
         readonly MessageHandler onMessage;
@@ -126,7 +127,8 @@ namespace Hapticd
         readonly Dictionary<int, string> theirTypes = new Dictionary<int, string>();
         readonly Dictionary<int, string> theirSenders = new Dictionary<int, string>();
         byte[] rest = new byte[0];
-        bool connected;
+        volatile bool connected;
+        volatile string devices = "";
 
         /// <summary>`types`: the names of all that will be sent.</summary>
         public Peer(string device, IEnumerable<string> types, MessageHandler onMessage)
@@ -135,6 +137,11 @@ namespace Hapticd
             this.onMessage = onMessage;
             foreach (string type in types) ourTypes.Add(type, ourTypes.Count);
         }
+
+        /// <summary>The other side has said that it speaks VRPN. Any thread.</summary>
+        public bool Connected { get { return connected; } }
+        /// <summary>Names of its devices, as far as it described them, with commas. Any thread.</summary>
+        public string Devices { get { return devices; } }
 
         /// <summary>What the stream begins with: our version, the device as sender 0, and the names of types.</summary>
         public byte[] Opening()
@@ -193,7 +200,10 @@ namespace Hapticd
                 PayloadReader payload = new PayloadReader("description", bytes, begin, size);
                 int length = payload.I32();
                 if (length < 1) throw new ProtocolException("a description of a name of " + length + " bytes");
-                (type == SenderDescription ? theirSenders : theirTypes)[sender] = payload.Text(length);
+                string described = payload.Text(length);
+                (type == SenderDescription ? theirSenders : theirTypes)[sender] = described;
+                if (type == SenderDescription && described != NoDevice)
+                    devices += (devices == "" ? "" : ", ") + described;
             }
             else if (type <= LowestType)
             {
