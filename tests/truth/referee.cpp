@@ -686,7 +686,7 @@ class Referee {
   }
 
   // A ball of the gap's radius that touches an edge of a face, turned around that edge: from the normal of
-  // the face (0) to the outward direction in its plane (half a turn of pi).
+  // the face (0) to the outward direction in its plane (pi / 2).
   struct Round {
     const Face* face = nullptr;
     Point foot = Point::Zero();
