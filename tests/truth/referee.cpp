@@ -578,10 +578,49 @@ class Referee {
     ++verdict_.longRules;
     const double radius = trial_.toolRadius_m;
     const std::vector<int> near = reference_.near(rendering_.proxy_m, radius + kTouch_m);
-    judgeDirection(near);
+    judgeDirection(withWedges(near));
     judgeLaw(near);
     if (radius > 0 && trial_.sides == Sides::both && !pops_) judgeOverlap(near);
     judgeRest();
+  }
+
+  // In a wedge of the angle a, the ball of a point tool, of radius R, touches the walls R / tan(a / 2) from
+  // where their planes meet, and the reported proxy may be there: below 22.6 degrees farther than kTouch_m.
+  // Adds the walls of each ball from which the proxy may be reported.
+  std::vector<int> withWedges(const std::vector<int>& near) const {
+    if (trial_.toolRadius_m > 0) return near;
+    std::vector<int> all = near;
+    const std::vector<int> walls = reference_.near(rendering_.proxy_m, kWedge_m);
+    const auto isNear = [&](int i) { return std::find(near.begin(), near.end(), i) != near.end(); };
+    for (const int i : walls) {
+      for (const int k : walls) {
+        if (i >= k || (isNear(i) && isNear(k)) || !holdBall(i, k, walls)) continue;
+        all.insert(all.end(), {i, k});
+      }
+    }
+    return all;
+  }
+
+  // Whether a ball rests between two faces, overlaps no other, and sees the proxy, which is on its straight
+  // way to where the planes of both meet: equally high above them.
+  bool holdBall(int i, int k, const std::vector<int>& others) const {
+    constexpr double kAcute = -0.923;  // cosine of two normals at 22.6 degrees
+    constexpr double kRadius_m = 0.5 * kGap_m;
+    const Point& p = rendering_.proxy_m;
+    const Point m = normalAt(reference_.face(i));
+    const Point n = normalAt(reference_.face(k));
+    if (m.dot(n) > kAcute || 1 + m.dot(n) < 1e-6) return false;
+    const double height = m.dot(p - reference_.face(i).a);
+    const double slack = kOnPlane * reference_.rounding();
+    if (std::abs(height - n.dot(p - reference_.face(k).a)) > slack) return false;
+    const Point ball = p + (kRadius_m - height) / (1 + m.dot(n)) * (m + n);
+    const auto distance = [&](int face) { return (nearestOf(reference_.face(face), ball) - ball).norm(); };
+    if ((ball - p).norm() > kWedge_m || std::max(distance(i), distance(k)) > kRadius_m + slack) return false;
+    return seesProxy(ball, others) && std::none_of(others.begin(), others.end(), [&](int other) {
+             const Face& f = reference_.face(other);
+             return reference_.touchableFrom(f, f.normal.dot(ball - f.a)) &&
+                    distance(other) < kRadius_m - slack;
+           });
   }
 
   Point normalAt(const Face& f) const {
@@ -646,48 +685,111 @@ class Referee {
     return open;
   }
 
-  // A point is a ball of the gap's radius. Where two faces meet without a shared edge, it sinks between them
-  // or rests on the step from one to the other: it rolls around the edge of a face until it meets another
-  // one. Up to there the surface turns from the normal of the face to the outward direction. The renderer
-  // keeps the ball off a face by 1e-9 of the largest coordinate of its object: steps of this height count, 1
-  // nm is 1.1 degrees.
-  void addSeams(const Face& f, const std::vector<int>& near, std::vector<Point>& normals) const {
-    constexpr double kRadius_m = 0.5 * kGap_m;
-    constexpr double kSkin = 1e-9;
-    constexpr int kTurns = 180;
-    if (f.unbounded || trial_.toolRadius_m > 0) return;
-    double farthest = 0;
-    for (const Face& g : reference_.faces()) {
-      if (!g.unbounded)
-        farthest = std::max(
-            {farthest, g.a.cwiseAbs().maxCoeff(), g.b.cwiseAbs().maxCoeff(), g.c.cwiseAbs().maxCoeff()});
-    }
-    const double least = kRadius_m - kSkin * farthest;
+  // A ball of the gap's radius that touches an edge of a face, turned around that edge: from the normal of
+  // the face (0) to the outward direction in its plane (pi / 2).
+  struct Round {
+    const Face* face = nullptr;
+    Point foot = Point::Zero();
+    Point normal = Point::Zero();
+    Point outward = Point::Zero();
+
+    Point direction(double angle) const { return std::cos(angle) * normal + std::sin(angle) * outward; }
+    Point centre(double angle) const { return foot + 0.5 * kGap_m * direction(angle); }
+    bool isOf(const Face& f) const { return f.a == face->a && f.b == face->b && f.c == face->c; }
+  };
+
+  std::vector<Round> roundsOf(const Face& f) const {
+    std::vector<Round> rounds;
+    if (f.unbounded || trial_.toolRadius_m > 0) return rounds;
     const Point& p = rendering_.proxy_m;
-    const Point n = normalAt(f);
     const std::array<Point, 3> corners{f.a, f.b, f.c};
     for (std::size_t k = 0; k < 3; ++k) {
       const Point side = corners[(k + 1) % 3] - corners[k];
       const Point foot =
           corners[k] + std::clamp(side.dot(p - corners[k]) / side.squaredNorm(), 0.0, 1.0) * side;
       if ((p - foot).norm() > kGap_m) continue;
-      const Point outward = side.cross(f.normal).stableNormalized();
-      const auto turned = [&](int step) {
-        const double angle = 0.5 * M_PI * step / kTurns;
-        return Point(std::cos(angle) * n + std::sin(angle) * outward);
-      };
-      const auto fits = [&](int step) {
-        const Point centre = foot + kRadius_m * turned(step);
+      rounds.push_back({&f, foot, normalAt(f), side.cross(f.normal).stableNormalized()});
+    }
+    return rounds;
+  }
+
+  // The ranges of angles, up to a quarter turn, in which the ball fits; `wanted`: how many.
+  template <class Fits>
+  static std::vector<std::array<double, 2>> rangesWhere(const Fits& fits, std::size_t wanted) {
+    constexpr int kParts = 90;
+    constexpr int kHalvings = 20;
+    const auto limit = [&](double fitting, double other) {
+      for (int i = 0; i < kHalvings; ++i) {
+        const double middle = 0.5 * (fitting + other);
+        (fits(middle) ? fitting : other) = middle;
+      }
+      return fitting;
+    };
+    std::vector<std::array<double, 2>> ranges;
+    double before = 0;
+    bool fitted = false;
+    for (int k = 0; k <= kParts; ++k) {
+      const double angle = 0.5 * M_PI * k / kParts;
+      const bool fitting = fits(angle);
+      if (fitting && !fitted) ranges.push_back({k == 0 ? 0 : limit(angle, before), angle});
+      if (fitting) ranges.back()[1] = angle;
+      if (!fitting && fitted) ranges.back()[1] = limit(before, angle);
+      if (!fitting && ranges.size() == wanted) break;
+      before = angle;
+      fitted = fitting;
+    }
+    return ranges;
+  }
+
+  // A point is a ball of the gap's radius. Where two faces meet without a shared edge, it sinks between them
+  // or rests on the step from one to the other: it rolls around the edge of a face until it meets another
+  // one. Up to there the surface turns from the normal of the face to the outward direction. The renderer
+  // keeps the ball off a face by 1e-9 of the largest coordinate of its object: steps of this height count, 1
+  // nm is 1.1 degrees.
+  //
+  // Where another face is so near that the ball does not fit above this one, it may be in the mouth of the
+  // slit: it rolled in from beside the edge until it met the other face. It is there only if it fits and sees
+  // the proxy, on a side of this face that can be touched.
+  void addSeams(const Face& f, const std::vector<int>& near, std::vector<Point>& normals) const {
+    constexpr double kSkin = 1e-9;
+    constexpr double kBeside = 0.5 * M_PI;
+    constexpr std::size_t kRanges = 3;
+    double farthest = 0;
+    for (const Face& g : reference_.faces()) {
+      if (!g.unbounded)
+        farthest = std::max(
+            {farthest, g.a.cwiseAbs().maxCoeff(), g.b.cwiseAbs().maxCoeff(), g.c.cwiseAbs().maxCoeff()});
+    }
+    const double least = 0.5 * kGap_m - kSkin * farthest;
+    for (const Round& round : roundsOf(f)) {
+      const auto overlapsNone = [&](const Point& centre, const auto& passed) {
         return std::none_of(near.begin(), near.end(), [&](int i) {
           const Face& other = reference_.face(i);
-          return !(other.a == f.a && other.b == f.b && other.c == f.c) && !passedFromBehind(other) &&
-                 (centre - nearestOf(other, centre)).norm() < least;
+          return !round.isOf(other) && !passed(other) && (centre - nearestOf(other, centre)).norm() < least;
         });
       };
-      int last = 0;
-      while (last < kTurns && fits(last + 1)) ++last;
-      if (last > 0) normals.push_back(turned(last));
+      const auto fitsAbove = [&](double angle) {
+        return overlapsNone(round.centre(angle), [&](const Face& other) { return passedFromBehind(other); });
+      };
+      const double last = fitsAbove(0) ? rangesWhere(fitsAbove, 1)[0][1] : 0.0;
+      if (last > 0) normals.push_back(round.direction(last));
+      if (last == kBeside) continue;
+      const auto fitsBeside = [&](double angle) {
+        const Point centre = round.centre(angle);
+        const auto passed = [&](const Face& other) {
+          return !reference_.touchableFrom(other, other.normal.dot(centre - other.a));
+        };
+        return !passed(f) && overlapsNone(centre, passed) && seesProxy(centre, near);
+      };
+      for (const auto& range : rangesWhere(fitsBeside, kRanges)) {
+        for (const double end : range) normals.push_back(round.direction(end));
+      }
     }
+  }
+
+  bool seesProxy(const Point& ball, const std::vector<int>& near) const {
+    return std::none_of(near.begin(), near.end(),
+                        [&](int i) { return reference_.pierces(i, ball, rendering_.proxy_m, 0); });
   }
 
   void judgeDirection(const std::vector<int>& near) {

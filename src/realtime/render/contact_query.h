@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "base/time.h"
 #include "geometry/gap_tolerance.h"
@@ -299,7 +300,10 @@ class ContactQuery {
   void countScans() noexcept { work_ += cache_.takeScans() / kScansOfOne; }
   static bool endUnexamined(const Path& path, ObjectHit& hit) noexcept;
   bool castTool(const Facet& f, const Path& path, double latest, CastHit& hit) const noexcept;
-  void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found) const noexcept;
+  std::span<const std::uint16_t> overlappedAt(const Vec3& p) const noexcept;
+  bool meetsBeside(const Facet& f, const Path& path, ObjectHit& hit) const noexcept;
+  void considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found,
+                     bool gathered = false) const noexcept;
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept;
@@ -357,6 +361,9 @@ class ContactQuery {
   mutable int work_ = 0;
   mutable int facetCasts_ = 0;
   std::array<std::uint32_t, FacetCache::kMaxTriangles> places_;  // of discs
+  // Of the present cast of a point tool; -1: not known yet.
+  mutable std::array<std::uint16_t, FacetCache::kMaxFacets> overlapped_;
+  mutable int overlappedCount_ = -1;
   std::uint64_t passable_ = 0;  // objects that the present cast does not meet
   bool pointTool_ = false;      // casts move the centre of the tool
 };

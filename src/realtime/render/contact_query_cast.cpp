@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -53,12 +54,50 @@ bool ContactQuery::castAtFacet(const Facet& f, const Vec3& p, const Vec3& g, Obj
   return found;
 }
 
+// The gathered facets that a point tool overlaps at p, in front of them: it came through one-sided faces from
+// behind, and has not risen by its radius yet. Once for each cast.
+std::span<const std::uint16_t> ContactQuery::overlappedAt(const Vec3& p) const noexcept {
+  if (overlappedCount_ < 0) {
+    const auto begin = overlapped_.begin();
+    const int near = cache_.facetsNearPath(p, Vec3::Zero(), overlapped_.data());
+    const auto end = std::remove_if(begin, begin + near, [&](std::uint16_t i) {
+      const Facet& f = cache_.begin()[i];
+      const double overlap = radiusAt(f) - 4 * f.skin;
+      return !isTouchable(f, faces(), p) || (nearestPointOf(f, p) - p).squaredNorm() >= overlap * overlap;
+    });
+    overlappedCount_ = static_cast<int>(end - begin);
+  }
+  return {overlapped_.data(), static_cast<std::size_t>(overlappedCount_)};
+}
+
+// Where a face that the tool overlaps goes on in another one, their common edge is no obstacle to a tool in
+// front of both: the other face holds it no higher than it is, and not at all where its way does not lead
+// into that. Then false.
+bool ContactQuery::meetsBeside(const Facet& f, const Path& path, ObjectHit& hit) const noexcept {
+  if (!hit.atEdge || faces() == scene::TouchableFaces::both) return true;
+  const Vec3 up = faces() == scene::TouchableFaces::back ? Vec3(-f.normal) : f.normal;
+  const double height = up.dot(path.p + hit.stop * path.d - f.a);
+  const auto goesOn = [&](std::uint16_t i) {
+    const Facet& g = cache_.begin()[i];
+    const Vec3& edge = hit.halfSpace.anchor;
+    return &g != &f && (nearestPointOf(g, edge) - edge).squaredNorm() <= g.skin * g.skin;
+  };
+  const auto overlapped = overlappedAt(path.p);
+  if (height < 0 || std::none_of(overlapped.begin(), overlapped.end(), goesOn)) return true;
+  constexpr double kRise = 0.25;  // of the skin: see Proxy::acceptOverlaps()
+  hit.depth = -up.dot(path.d);
+  hit.halfSpace = {up, f.a, std::min(hit.halfSpace.standoff, height + kRise * f.skin)};
+  hit.atEdge = false;
+  return hit.depth > 0;
+}
+
 // A total order on hits, so that the first one does not depend on the order of visits.
-void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best,
-                                 bool& found) const noexcept {
+void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& best, bool& found,
+                                 bool gathered) const noexcept {
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
   if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
+  if (gathered && !meetsBeside(f, path, hit)) return;
   hit.object = f.object;
   hit.triangle = f.triangle;
   const auto rank = [this](const ObjectHit& h) {
@@ -76,12 +115,13 @@ bool ContactQuery::castGathered(const Path& path, int only, ObjectHit& hit) noex
 bool ContactQuery::castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept {
   const Vec3 start = path.p + path.begin * path.d;
   cache_.moveTo(start);
+  overlappedCount_ = -1;
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
   }
   const auto consider = [&](const Facet& f) {
-    if (only < 0 || f.object == only) considerFacet(f, path, hit, found);
+    if (only < 0 || f.object == only) considerFacet(f, path, hit, found, true);
   };
   const auto latest = [&] { return found ? hit.stop : path.end; };
   // The facet that blocked the last cast often blocks this one: then few others are near the path before it.

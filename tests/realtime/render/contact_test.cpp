@@ -280,5 +280,18 @@ TEST_P(ContactTest, only_touchable_sides_are_felt) {
   }
 }
 
+// A hand with friction comes through a sheet from behind and creeps on, 1 um above it, across an edge between
+// two of its triangles: as a ball of 5 um it overlaps both, and the edge holds nothing.
+TEST_P(ContactTest, what_came_from_behind_meets_no_edges) {
+  add(plane(0.05, 100), surface(1000, 0.8, 0.5));
+  start({0.003225, 0.003775, -0.001});
+  to({0.003225, 0.003775, -5e-7});
+  for (int i = 0; i <= 30; ++i) {
+    const Rendering& r = to({0.003225 + 5e-5 * i, 0.003775 - 5e-5 * i, -5e-7 + 3e-7 * i});
+    EXPECT_FALSE(r.touching) << i;
+    EXPECT_EQ(r.force_N.norm(), 0) << i;
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture
