@@ -3,7 +3,8 @@
 // Between HIP and proxy is one spring, with the stiffness of what is near the proxy. Where the HIP passes the
 // middle of a body, the proxy goes around it in one tick, from a soft surface to a place beside a stiff one,
 // and a spring as long as the one before stores several times as much: it would throw the hand out. It acts
-// with the share that stores what there was. The share returns slowly: within a second.
+// with the share that stores what there was. The share returns slowly: within a second. The same where it
+// goes from a face that yields, whose spring stores less, to a place beside one that does not.
 #pragma once
 
 #include "realtime/render/passivity_controller.h"
@@ -14,8 +15,8 @@ namespace hapticd::realtime {
 class EnergyLimit {
  public:
   void reset() noexcept { *this = EnergyLimit(); }
-  /// The share of `springs` that acts in this tick, 0 … 1. Not `limited`: something moves or yields, or a
-  /// command changed it; what is stored then is taken as it is.
+  /// The share of `springs` that acts in this tick, 0 … 1. Not `limited`: something moves, or a command
+  /// changed it; what is stored then is taken as it is.
   double step(const SpringState& springs, bool limited, const Vec3& hip_m, double period_s) noexcept;
   double share() const noexcept { return share_; }
 

@@ -15,6 +15,7 @@
 namespace hapticd::realtime {
 namespace {
 
+constexpr std::uint32_t kChanged = kRenderGeometryJump | kRenderReleased | kRenderWorkLimit | kRenderEnclosed;
 constexpr double kShortestPeriod_s = 1e-5;  // keeps speeds finite when a time stamp repeats
 
 void scaleContact(double share, Rendering& out) {
@@ -38,24 +39,23 @@ Vec3 shadedSprings(const ContactSet& contactSet) {
 }
 
 // The springs of surfaces at rest. Unknown where something moves, or where the surface changes or yields.
-SpringState restingSprings(const ContactSet& contactSet, bool changed, double toolRadius_m,
+SpringState restingSprings(const ContactSet& contactSet, const Springs& springs, bool changed,
                            const Rendering& out) {
-  constexpr std::uint32_t kChanged =
-      kRenderGeometryJump | kRenderReleased | kRenderPopthrough | kRenderWorkLimit | kRenderEnclosed;
   SpringState state;
   const BlendedSpring& spring = contactSet.spring;
-  state.known = !changed && (out.status & kChanged) == 0;
+  state.known = !changed && !springs.yields && (out.status & (kChanged | kRenderPopthrough)) == 0;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    state.known = state.known && (constraint.rests || constraint.creeps) &&
-                  !isYielding(constraint, spring.stiffness_N_per_m, toolRadius_m);
+    state.known = state.known && (constraint.rests || constraint.creeps);
   }
   if (!out.touching) return state;
   const double kappa = spring.kappa_N_per_m;
-  state.force_N = out.contactForce_N - out.normalForce_N + shadedSprings(contactSet);
+  state.force_N =
+      out.contactForce_N - out.normalForce_N + (springs.yields ? springs.sum_N : shadedSprings(contactSet));
   state.normal = out.normal;
   state.pressed_N = out.contactForce_N.dot(out.normal);
-  state.stored_J = 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
+  state.stored_J = springs.yields ? springs.stored_J
+                                  : 0.5 * kappa * (contactSet.normal_m + contactSet.lateral_m).squaredNorm();
   state.stiffness_N_per_m = kappa;
   state.whole = (out.status & kRenderIterationLimit) == 0;
   return state;
@@ -187,13 +187,14 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   const double period_s = std::max(base::toSeconds(period), kShortestPeriod_s);
   const ContactSet& contactSet = s.proxy.follow({&scene, now}, hip, period_s, out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
+  const Springs forces = springsOf(contactSet, radius);
   if ((out.status & kRenderReleased) == 0)
-    applySurfaceLaw(contactSet, out.proxy_m, device.velocity_m_per_s, radius, out);
+    applySurfaceLaw(contactSet, forces, out.proxy_m, device.velocity_m_per_s, radius, out);
   // A command that changes nothing that is felt, as of a surface elsewhere, is none here.
   const auto felt = [&] { return LastForce{out.contactForce_N, contactSet.spring.kappa_N_per_m, hip}; };
   const auto steps = [&] { return s.proxy.commandChanged() && s.last.stepsTo(felt()); };
-  SpringState springs = restingSprings(contactSet, steps(), radius, out);
-  const bool limited = springs.known && !s.proxy.commandChanged() && restsUnshaded(contactSet);
+  SpringState springs = restingSprings(contactSet, forces, steps(), out);
+  const bool limited = (out.status & kChanged) == 0 && !s.proxy.commandChanged() && restsUnshaded(contactSet);
   const double stored = s.energy.step(springs, limited, hip, period_s);
   const double share =
       s.proxy.feltShare() * stored * s.rise.step(stored * out.contactForce_N, springs.known, period_s);

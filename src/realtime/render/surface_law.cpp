@@ -14,33 +14,6 @@ struct ContactShare {
   double friction_N = 0;  // bound of friction and adhesion
 };
 
-// The springs of the faces, newtons. Where a face yields, its force stays the popthrough force over the
-// length that the ball needs to get behind the face; if there is no room for it, the spring goes on from
-// there. A function of the depth alone, so that it gives no more than it took.
-std::array<double, kMaxActive> springForces(const ContactSet& contactSet, double toolRadius_m) {
-  std::array<double, kMaxActive> forces{};
-  const double stiffness = contactSet.spring.stiffness_N_per_m;
-  Vec3 sum = Vec3::Zero();
-  bool yields = false;
-  for (int i = 0; i < contactSet.count; ++i) {
-    const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
-    double& force = forces[static_cast<std::size_t>(i)];
-    force = stiffness * constraint.depth_m;
-    if (isYielding(constraint, stiffness, toolRadius_m)) {
-      const double limit = constraint.surface.popthrough_N;
-      force = std::max(limit, limit + stiffness * (constraint.depth_m - 2 * toolRadius_m));
-      yields = true;
-    }
-    sum += force * constraint.halfSpace.normal;
-  }
-  // Faces at an acute angle push against each other: less of one must not be more of both.
-  const double most = stiffness * contactSet.normal_m.norm();
-  if (yields && sum.norm() > most) {
-    for (double& force : forces) force *= most / sum.norm();
-  }
-  return forces;
-}
-
 // Share of its damping that a face exerts beside the others: all of it where they are at right angles, and
 // about one in all where they are nearly parallel, so that a seam feels as the flat surface that it divides.
 // In no direction do the faces together damp more than the most damped of them: with these weights the rows
@@ -78,15 +51,14 @@ Contact& contactWith(std::int32_t object, Rendering& out) {
 using ContactShares = std::array<ContactShare, kMaxActive>;
 
 // The face with the largest force gives point and normal of its object's contact.
-void addNormalForces(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity,
-                     double toolRadius_m, ContactShares& shares, Rendering& out) {
-  const std::array<double, kMaxActive> springs = springForces(contactSet, toolRadius_m);
+void addNormalForces(const ContactSet& contactSet, const Springs& springs, const Vec3& proxy_m,
+                     const Vec3& hipVelocity, double toolRadius_m, ContactShares& shares, Rendering& out) {
   Vec3 unshaded = Vec3::Zero();
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
-    share.spring_N = springs[static_cast<std::size_t>(i)];
+    share.spring_N = springs.forces_N[static_cast<std::size_t>(i)];
     share.normal_N = normalForce(constraint, share.spring_N, dampingShare(contactSet, i), hipVelocity);
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
@@ -136,31 +108,31 @@ double shareUpTo(double most, const Vec3& force, const Vec3& added) {
 
 // The slope of the stiffness pushes along the surfaces. Friction and adhesion bear what else the lateral part
 // of the spring exerts, each contact within its bound.
-void addTangentialForces(const ContactSet& contactSet, const ContactShares& shares, double toolRadius_m,
+void addTangentialForces(const ContactSet& contactSet, const Springs& springs, const ContactShares& shares,
                          Rendering& out) {
   Vec3 spring = Vec3::Zero();
   double bound = 0;
-  bool yields = false;
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactShare& share = shares[static_cast<std::size_t>(i)];
     spring += share.spring_N * contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
     bound += share.friction_N;
-    yields = yields || isYielding(contactSet.constraints[static_cast<std::size_t>(i)],
-                                  contactSet.spring.stiffness_N_per_m, toolRadius_m);
   }
   if (!(out.depth_m > 0)) return;
-  const Vec3 slope = contactSet.spring.slope_N + contactSet.spring.turn_N;
+  // While a face yields, the spring is shorter, and its energy changes less with the stiffness.
+  const double stretch =
+      springs.yields ? spring.norm() / (contactSet.spring.stiffness_N_per_m * out.depth_m) : 1;
+  const Vec3 slope = stretch * stretch * (contactSet.spring.slope_N + contactSet.spring.turn_N);
   if (!slope.isZero(0)) {
     out.contactForce_N += slope;
     distribute(slope, shares, contactSet.count, [](const ContactShare& s) { return s.spring_N; });
   }
   if (!(bound > 0)) return;
   const double stiffness = spring.norm() / out.depth_m;
-  const Vec3 lateral = stiffness * contactSet.lateral_m - contactSet.spring.slope_N;
+  const Vec3 lateral = stiffness * contactSet.lateral_m - stretch * stretch * contactSet.spring.slope_N;
   const double force = lateral.norm();
   if (!(force > 0)) return;
   double share = std::min(1.0, bound / force);
-  if (yields) {
+  if (springs.yields) {
     // The springs may point elsewhere than the depths, which friction is across.
     const Vec3 displacement = contactSet.normal_m + contactSet.lateral_m;
     share *= shareUpTo(contactSet.spring.stiffness_N_per_m * displacement.norm(), spring, share * lateral);
@@ -178,12 +150,12 @@ void addTangentialForces(const ContactSet& contactSet, const ContactShares& shar
 
 }  // namespace
 
-void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Vec3& hipVelocity_m_per_s,
-                     double toolRadius_m, Rendering& out) noexcept {
+void applySurfaceLaw(const ContactSet& contactSet, const Springs& springs, const Vec3& proxy_m,
+                     const Vec3& hipVelocity_m_per_s, double toolRadius_m, Rendering& out) noexcept {
   // The proxy keeps a small distance from faces, so that it may be held before the HIP is below them.
   if (contactSet.normal_m.isZero(0)) return;
   ContactShares shares;
-  addNormalForces(contactSet, proxy_m, hipVelocity_m_per_s, toolRadius_m, shares, out);
+  addNormalForces(contactSet, springs, proxy_m, hipVelocity_m_per_s, toolRadius_m, shares, out);
   Vec3 inward = Vec3::Zero();
   for (int i = 0; i < contactSet.count; ++i)
     inward += contactSet.constraints[static_cast<std::size_t>(i)].halfSpace.normal;
@@ -192,7 +164,7 @@ void applySurfaceLaw(const ContactSet& contactSet, const Vec3& proxy_m, const Ve
   out.normal = (out.depth_m > 0 ? contactSet.normal_m : inward).normalized();
   out.scp_m = proxy_m - toolRadius_m * out.normal;
   out.contactForce_N = out.normalForce_N;
-  addTangentialForces(contactSet, shares, toolRadius_m, out);
+  addTangentialForces(contactSet, springs, shares, out);
   const auto weaker = [](const Contact& a, const Contact& b) { return a.force_N.norm() < b.force_N.norm(); };
   const Contact* const first = out.contacts.data();
   out.touchedObject = std::max_element(first, first + out.contactCount, weaker)->object;
@@ -205,12 +177,6 @@ const Contact* touchedContact(const Rendering& rendering) noexcept {
     return c.object == rendering.touchedObject;
   });
   return found == end ? nullptr : found;
-}
-
-bool isYielding(const ContactConstraint& constraint, double stiffness_N_per_m, double toolRadius_m) noexcept {
-  const double limit = constraint.surface.popthrough_N;
-  return constraint.source >= 0 && limit > 0 && stiffness_N_per_m * constraint.depth_m > limit &&
-         2 * stiffness_N_per_m * toolRadius_m > limit;
 }
 
 void applyAdhesion(const Adhesion& adhesion, Rendering& out) noexcept {

@@ -107,6 +107,19 @@ TEST_F(EnergyLimitTest, A_share_returns_slowly_whatever_comes) {
   EXPECT_NEAR(press(4e-3, 1000, false), 0.101, 1e-9);
 }
 
+// It yields with 1 N from 1 mm on, and stores that times the way.
+TEST_F(EnergyLimitTest, Beside_a_face_that_yields_acts_what_was_paid) {
+  press(1e-3);
+  for (int i = 1; i <= 30; ++i) {
+    const double depth_m = 1e-3 + i * 1e-4;
+    SpringState springs = floorAt(depth_m);
+    springs.force_N = Vec3::UnitZ();
+    springs.stored_J = 0.5e-3 + i * 1e-4;
+    EXPECT_EQ(limit.step(springs, true, -depth_m * Vec3::UnitZ(), kPeriod_s), 1);
+  }
+  EXPECT_NEAR(press(4e-3), 3.5e-3 / 8e-3, 1e-9);
+}
+
 // A floor of 100 N/m under the origin, and a plate of 2000 N/m in it.
 class EnergyShareTest : public testing::Test {
  protected:
