@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fuzzes every parser of bytes from outside with libFuzzer (clang 19), on all processors, and appends a row for each target to
-# the ledger in docs/testing.md.
+# the ledger in docs/ledgers.md.
 #   scripts/fuzz.sh --hours N [--jobs N] [TARGET...]    the hours are shared by the targets; without names: all of them
 #   scripts/fuzz.sh --pack [TARGET...]                  minimises the corpora and writes them to testdata/fuzz
 #   scripts/fuzz.sh --list                              the targets
@@ -126,6 +126,6 @@ printf '%s\n' "${targets[@]}" | xargs -P "$jobs" -I{} bash -c 'run {}'
 # Before the line that marks the end of the ledger.
 for target in "${targets[@]}"; do cat "build/fuzz/logs/$target.row"; done >build/fuzz/logs/rows
 awk '/^<!-- end of the fuzzing ledger -->$/ { while ((getline row < "build/fuzz/logs/rows") > 0) print row } { print }' \
-  docs/testing.md >build/fuzz/logs/testing.md
-cp build/fuzz/logs/testing.md docs/testing.md
+  docs/ledgers.md >build/fuzz/logs/ledgers.md
+cp build/fuzz/logs/ledgers.md docs/ledgers.md
 grep -q . build/fuzz/logs/rows && ! grep -vq '| 0 |$' build/fuzz/logs/rows

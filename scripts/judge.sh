@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Judges the renderer on random scenes for hours, on all processors, with seeds that were not judged before, and appends a row
-# to the ledger in docs/testing.md.
+# to the ledger in docs/ledgers.md.
 #   scripts/judge.sh --hours N [--jobs N]
 # Uses the release build in build/release, which it brings up to date. Findings: build/judge/COMMIT/, replayed by
 # 'build/release/bin/hapticd_judge --replay FILE'. Exit status 1 with findings.

@@ -1,5 +1,5 @@
 # Sourced by judge.sh and soak.sh: runs a program for hours on all processors, with seeds that were not run before, and
-# appends a row to a ledger in docs/testing.md. The caller defines usage().
+# appends a row to a ledger in docs/ledgers.md. The caller defines usage().
 
 # read_hours ARGUMENTS...: sets jobs and seconds.
 read_hours() {
@@ -46,6 +46,6 @@ append_row() {
   local line
   line="| $(date -u +%Y-%m-%d) | $commit | $2 |"
   echo "$line"
-  sed -i "s%^<!-- end of the ledger of $1 -->\$%${line//%/\\%}\n&%" docs/testing.md
+  sed -i "s%^<!-- end of the ledger of $1 -->\$%${line//%/\\%}\n&%" docs/ledgers.md
   [ "${2##* }" = 0 ]
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Simulates the whole server for hours, on all processors, with seeds that were not run before, and appends a row to the
-# ledger of simulations in docs/testing.md.
+# ledger of simulations in docs/ledgers.md.
 #   scripts/soak.sh --hours N [--jobs N]
 # Uses the release build in build/release, which it brings up to date. A finding is run again with
 # 'build/release/bin/hapticd-sim --seed SEED --seconds 60 --shrink'. Exit status 1 with findings.
