@@ -1,4 +1,4 @@
-"""Messages of OpenIGTLink against bytes that the protocol's own library wrote (libopenigtlink 1.11)."""
+"""Messages of OpenIGTLink against bytes that the protocol's own library wrote: version 1.11, and 3.1 for header version 2."""
 
 import struct
 import warnings
@@ -39,6 +39,16 @@ GOLDEN = {
         "0000000400000005000000060203000000076e00000000003f80000040000000404000004080000040a0000040c0000040e0"
         "0000410000004110000041200000413000004140000041500000416000004170000041800000418800004190000041980000"
         "41a00000"
+    ),
+    "transform, header version 2": (
+        "00025452414e53464f524d000000506c6174650000000000000000000000000000006553f100000000000000000000000060"
+        "867546e2f34f01c6000c0012000000120000004d000000003f80000000000000bf8000000000000000000000000000000000"
+        "00003f80000041280000c1a0000041f200000002000300030000000500060003000000046b657976616c756573656e646572"
+        "70656572"
+    ),
+    "string, header version 2": (
+        "0002535452494e47000000000000506c6174650000000000000000000000000000006553f10000000000000000000000001f"
+        "9553abcf57f771cd000c000200000000000000000003000d73746966666e6573733d302e340000"
     ),
 }
 
@@ -114,6 +124,14 @@ def test_polygons_of_one_size_and_of_hardly_any_corners() -> None:
         triangles = igtl.read_polydata(polydata(points, cells, 3, cells, 3))[1]
         assert len(triangles) == 2 * 3 * max(size - 2, 0)
     assert len(igtl.read_polydata(bytes(40))[1]) == 0
+
+
+def test_header_version_2_of_the_library_is_read() -> None:
+    data = bytes.fromhex(GOLDEN["transform, header version 2"])  # with two entries of metadata
+    header, _ = split(data)
+    assert header[:3] == (2, "TRANSFORM", "Plate")
+    assert content(data) == content(bytes.fromhex(GOLDEN["transform"]))
+    assert igtl.read_string(content(bytes.fromhex(GOLDEN["string, header version 2"]))) == "stiffness=0.4"
 
 
 def test_extended_header_and_metadata_are_skipped() -> None:

@@ -101,7 +101,7 @@ bool print(igtl::ClientSocket& socket, igtl::MessageHeader::Pointer& header) {
   } else {
     return false;
   }
-  std::cout << std::endl;
+  std::cout << "\n" << std::flush;
   return true;
 }
 
