@@ -111,6 +111,20 @@ def test_models_surfaces_and_places_in_any_order(server: Server, bridge: Bridge)
         bridge.wait_for("object 1 is 'Table': 0 triangles")
 
 
+def test_texts_are_sent_again_only_when_they_change(server: Server, bridge: Bridge) -> None:
+    with hapticd.connect(server.tcp) as hand:
+        lift(hand)
+        sender = Sender(bridge)
+        messages = [sender.receive() for _ in range(60)]
+        texts = {header.name: igtl.read_string(content) for header, content in messages if header.type == "STRING"}
+        assert texts == {"PhantomForce": "0.000 0.000 0.000", "PhantomButtons": "up up"}
+        assert [header.name for header, _ in messages].count("PhantomProxy") == 29
+        hand.hold_hand((0, 0, 30), buttons=1)
+        hand.flush_all()
+        header, content = sender.receive_kind("STRING")
+        assert (header.name, igtl.read_string(content)) == ("PhantomButtons", "down up")
+
+
 def test_a_large_model_arrives_whole(server: Server, bridge: Bridge) -> None:
     vertices, triangles = hapticd.sphere(25, rings=100)
     cells = np.insert(triangles, 0, 3, axis=1).astype(">u4").tobytes()

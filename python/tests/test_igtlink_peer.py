@@ -75,6 +75,8 @@ def test_the_hand_touches_the_model_of_the_client(server: Server) -> None:
         assert hand.latest.touched_object.object == 2
 
         bridge.stop()  # takes the model out of the scene, and ends the client
-        wait(hand, lambda: hand.latest.force.force_N[2] == 0)
+        for z_mm in (30, 12):
+            hand.hold_hand((3, -4, z_mm))
+            wait(hand, lambda: all(abs(hand.latest.pose[sensor].position_m[2] - z_mm / 1000) < 1e-5 for sensor in (0, 1)))
         assert peer.process.wait(30) == 0
         peer.thread.join(30)
