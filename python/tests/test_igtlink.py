@@ -72,13 +72,15 @@ def press(hand: hapticd.Client, down_to_mm: float) -> None:
 
 
 def feels(hand: hapticd.Client, stiffness_N_per_mm: float) -> bool:
-    """Whether the force becomes the one of this stiffness."""
-
-    def is_so() -> bool:
-        depth_mm = 1000 * hand.latest.depth.depth_m
-        return depth_mm > 0.2 and bool(abs(hand.latest.force.force_N[2] - stiffness_N_per_mm * depth_mm) < 0.01)
-
-    return _wait(hand, is_so, 60)
+    """Whether the force becomes the one of this stiffness, and stays so."""
+    hand.subscribe(hapticd.Reports.USUAL | hapticd.Reports.TICK)
+    matching = 0
+    for tick in hand.reports("tick", seconds=60):
+        depth_mm = 1000 * tick.depth_m
+        matching = matching + 1 if depth_mm > 0.2 and abs(tick.force_N[2] - stiffness_N_per_mm * depth_mm) < 0.01 else 0
+        if matching == 300:
+            return True
+    return False
 
 
 def lift(hand: hapticd.Client) -> None:
