@@ -25,7 +25,7 @@ from . import _openigtlink as igtl
 from . import aio
 from . import reports as r
 from ._address import parse
-from ._codec import printable, shortened
+from ._codec import shortened
 from .errors import Error
 from .scene import IDENTITY, Surface
 
@@ -298,7 +298,7 @@ def _matrix(pose: r.PoseReport) -> Matrix:
 
 
 def _log(text: str) -> None:
-    print("igtlink:", printable(text), flush=True)
+    print("igtlink:", text, flush=True)
 
 
 # --- the command

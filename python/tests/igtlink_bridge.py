@@ -1,5 +1,6 @@
 """The bridge to OpenIGTLink as a process, for the tests."""
 
+import atexit
 import re
 import signal
 import subprocess
@@ -21,6 +22,7 @@ class Bridge:
             stderr=subprocess.STDOUT,
             text=True,
         )
+        atexit.register(self.process.kill)  # of a test that fails
         self._changed = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
