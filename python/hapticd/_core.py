@@ -849,6 +849,8 @@ class Core(Commands):
         else one by one, after a message that removes the present mesh. Without triangles, consecutive triples of
         vertices are triangles."""
         clear = [self._frame(m.ClearTrimesh(object))]
+        if triangles is not None and not len(triangles):
+            return clear, 1  # servers take vertices without triangles for a list of corners
         if self._has(m.FEATURE_BULK_MESH):
             frames = clear + self._run_frames(m.MeshVertices, object, 0, vertices)
             if triangles is not None:

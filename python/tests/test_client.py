@@ -184,6 +184,21 @@ def test_a_batch_that_raises_sends_nothing(server: Server) -> None:
                     pass
 
 
+def test_a_mesh_without_triangles_is_no_list_of_corners() -> None:
+    none = np.zeros((0, 3), dtype=np.int32)
+    for extensions in (True, False):
+        server = ScriptedServer(extensions)
+        with hapticd.connect(server.name) as hand:
+            hand.upload_mesh(3, np.eye(3), none)
+            hand.send_text("end")
+            hand.flush_all()
+            server.wait_for("vrpn_Base text_message")
+        sent = [name for name, _ in server.received]
+        assert "vrpn_ForceDevice clearTrimesh" in sent
+        assert not any("ertex" in name or "ertices" in name for name in sent), sent
+        server.close()
+
+
 def test_a_large_mesh_reports_its_progress(server: Server) -> None:
     vertices, triangles = hapticd.sphere(25, rings=100)
     with hapticd.connect(server.tcp) as hand:

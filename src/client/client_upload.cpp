@@ -166,7 +166,9 @@ void Client::uploadMesh(int object, const MeshView& mesh, const Callback<UploadP
   if (!connected()) waitConnected(impl_->options.connectTimeout);
   impl_->waitAnswered();
   if (impl_->has(wire::kFeatureBulkMesh)) {
-    impl_->uploadRuns(object, mesh.vertices, mesh.triangles, progress);
+    // Servers take vertices without triangles for a list of corners.
+    const Vertices vertices = mesh.triangles.empty() ? Vertices{} : mesh.vertices;
+    impl_->uploadRuns(object, vertices, mesh.triangles, progress);
   } else {
     impl_->uploadTriples(object, mesh.triangles.size() * 3, progress,
                          [&](std::size_t i) { return mesh.vertices[mesh.triangles[i / 3][i % 3]]; });

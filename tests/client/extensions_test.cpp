@@ -185,6 +185,18 @@ TEST(Extensions, AServerWithoutBatchesGetsAMeshWithoutOne) {
   EXPECT_TRUE(is(received[2], wire::MeshTriangles{3, 0, {{2, 1, 0}}}));
 }
 
+TEST(Extensions, AMeshWithoutTrianglesIsNoListOfCorners) {
+  ScriptedServer server(able());
+  Client client(server.tcpName());
+  const std::vector<std::array<float, 3>> vertices{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  client.uploadMesh(3, {vertices, {}});
+  auto received = server.waitReceived(3);
+  ASSERT_EQ(received.size(), 3U);
+  EXPECT_TRUE(is(received[0], wire::BatchBegin{}));
+  EXPECT_TRUE(is(received[1], wire::ClearTrimesh{3}));
+  EXPECT_TRUE(is(received[2], wire::BatchCommit{}));
+}
+
 TEST(Extensions, ATokenHas16To128Characters) {
   Client client("Phantom@tcp://127.0.0.1:1", {.connectTimeout = 0ms});
   for (const std::size_t size : {1U, 15U, 129U}) {

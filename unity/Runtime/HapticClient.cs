@@ -187,6 +187,7 @@ namespace Hapticd
             Batch(() =>
             {
                 Send(Force + "clearTrimesh", new Payload().I32(obj));
+                if (triangles.Length == 0) return;  // the server takes vertices alone for a list of corners
                 SetVertices(obj, 0, vertices_mm);
                 for (int at = 0; at < triangles.Length; at += NumbersInMessage)
                 {
