@@ -256,14 +256,14 @@ static class Tests
             client.SetTransform(2, away);
             Until(() => !Newest(client).Touching, "the sphere is away");
             client.SetTransform(2, new double[] { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 });
-            client.HoldHand(new Triple(0, 30, 0), Rotation.Identity, 1);
+            client.HoldHand(new Triple(0, 30, 0), Rotation.Identity);
             Until(() => Newest(client).Hand_m.Y > 0.0299, "the hand is above");
             client.SetMesh(2, vertices, new int[0]);
             ulong revision = Newest(client).Revision;
             Until(() => Newest(client).Revision > revision, "the mesh is empty");
             Press(client, 30, 20);
             Check(!Newest(client).Touching, "vertices without triangles are not felt");
-            client.SetTouchable(2, false);
+            client.HoldHand(new Triple(0, 30, 0), Rotation.Identity, 1);
             Until(() => Newest(client).Pressed(0), "the button is down");
             TickReport[] ticks = client.TakeTicks();
             Check(ticks.Length > 10, "ticks were kept");
