@@ -163,7 +163,7 @@ void addExport(CLI::App& app) {
   command->footer(
       "mcap  ticks, poses, guard, scene commands and markers, for Foxglove and other readers of MCAP\n"
       "csv   one row for each tick of each device; --hand of 'hapticd serve' and 'hapticd render' reads it\n"
-      "vrpn  the reports that a client would have received; VRPN clients open it as "
+      "vrpn  the reports and markers that a client would have received; VRPN clients open it as "
       "Phantom@file:///path/to/the.vrpn\n"
       "mcap and csv come with OUT.json, where OUT is no pipe or device: program, devices, configuration, "
       "surfaces, markers.\n"

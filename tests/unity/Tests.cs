@@ -369,6 +369,8 @@ static class Tests
                 Check(text.Contains(part), text);
             };
             refused("4 coordinates", () => client.SetMesh(0, new float[4], new int[0]));
+            refused("5 coordinates", () => client.SetVertices(0, 0, new float[5]));
+            refused("vertex 0 is not finite", () => client.SetVertices(0, 0, new[] { 0, 0, float.PositiveInfinity }));
             refused("2 vertex numbers", () => client.SetMesh(0, new float[3], new int[2]));
             refused("vertex 1", () => client.SetMesh(0, new float[3], new[] { 0, 0, 1 }));
             refused("vertex 0 is not finite", () => client.SetMesh(0, new[] { 0, float.NaN, 0 }, new int[0]));

@@ -41,7 +41,7 @@ namespace Hapticd
         readonly TcpClient tcp;
         readonly Peer peer;
         readonly object outgoing = new object();
-        readonly Queue<byte[]> urgent = new Queue<byte[]>();  // overtakes the other queue, which begins at whole messages
+        readonly Queue<byte[]> urgent = new Queue<byte[]>();  // overtakes the other queue
         readonly Queue<byte[]> queue = new Queue<byte[]>();
         readonly object incoming = new object();
         readonly Queue<TickReport> ticks = new Queue<TickReport>();
@@ -183,7 +183,8 @@ namespace Hapticd
         /// vertices and coordinates that are not finite.</summary>
         public void SetMesh(int obj, float[] vertices_mm, int[] triangles)
         {
-            CheckMesh(vertices_mm, triangles);
+            CheckVertices(vertices_mm);  // also of a mesh without triangles
+            CheckTriangles(triangles, vertices_mm.Length / 3);
             Batch(() =>
             {
                 Send(Force + "clearTrimesh", new Payload().I32(obj));
@@ -199,9 +200,11 @@ namespace Hapticd
             });
         }
 
-        /// <summary>Moves vertices from number `first` on, for meshes that deform: x y z of each.</summary>
+        /// <summary>Moves vertices from number `first` on, for meshes that deform: x y z of each. Throws ArgumentException for
+        /// a list of another length and coordinates that are not finite.</summary>
         public void SetVertices(int obj, int first, float[] vertices_mm)
         {
+            CheckVertices(vertices_mm);
             for (int at = 0; at < vertices_mm.Length; at += NumbersInMessage)
             {
                 int count = Math.Min(NumbersInMessage, vertices_mm.Length - at);
@@ -266,14 +269,15 @@ namespace Hapticd
         /// <summary>Removes all meshes and effects, and resets the workspace.</summary>
         public void ResetScene() { Send(Force + "resetScene", new Payload().Text("", 1, false, "")); }
 
-        /// <summary>What `commands` sends takes effect in one tick. Nothing is sent when it throws. Batches do not nest.</summary>
+        /// <summary>What `commands` sends takes effect in one tick. Nothing is sent when it throws. A batch within
+        /// a batch is part of it.</summary>
         public void Batch(Action commands)
         {
             lock (outgoing)
             {
                 if (batch != null)
                 {
-                    commands();  // part of the batch around it
+                    commands();
                     return;
                 }
                 batch = new List<byte[]>();
@@ -581,22 +585,26 @@ namespace Hapticd
             }
         }
 
-        static void CheckMesh(float[] vertices_mm, int[] triangles)
+        // The server ends the connection of a client that sends part of a vertex.
+        static void CheckVertices(float[] vertices_mm)
         {
             if (vertices_mm.Length % 3 != 0)
                 throw new ArgumentException(vertices_mm.Length + " coordinates: give x, y and z of each vertex");
-            if (triangles.Length % 3 != 0)
-                throw new ArgumentException(triangles.Length + " vertex numbers: give three for each triangle");
             for (int i = 0; i < vertices_mm.Length; ++i)
             {
                 if (float.IsNaN(vertices_mm[i]) || float.IsInfinity(vertices_mm[i]))
                     throw new ArgumentException("vertex " + i / 3 + " is not finite");
             }
+        }
+
+        static void CheckTriangles(int[] triangles, int vertices)
+        {
+            if (triangles.Length % 3 != 0)
+                throw new ArgumentException(triangles.Length + " vertex numbers: give three for each triangle");
             foreach (int vertex in triangles)
             {
-                if (vertex < 0 || vertex >= vertices_mm.Length / 3)
-                    throw new ArgumentException("a triangle with vertex " + vertex + ": there are " +
-                                                vertices_mm.Length / 3);
+                if (vertex < 0 || vertex >= vertices)
+                    throw new ArgumentException("a triangle with vertex " + vertex + ": there are " + vertices);
             }
         }
 
