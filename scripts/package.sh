@@ -81,6 +81,13 @@ d}" "$debian/control.in" >"$debian/control"
   else
     sed 's/^@PYTHON@$//' "$debian/control.in" >"$debian/control"
   fi
+  if [ -e "$out/stage/usr/bin/hapticd-ros2" ]; then
+    sed -i -e "/^@ROS2@$/{r packaging/debian/ros2.in
+d}" "$debian/control"
+  else
+    sed -i 's/^@ROS2@$//' "$debian/control"
+    rm "$debian"/hapticd-ros2.*
+  fi
   sed -e 's/^$/./; s/^/ /' LICENSE >"$work/license"
   sed -e "/^@LICENSE@$/{r $work/license
 d}" "$debian/copyright.in" >"$debian/copyright"
@@ -98,6 +105,8 @@ d}" "$debian/copyright.in" >"$debian/copyright"
 
 build=$source/build/release
 [ -e "$build/build.ninja" ] || { scripts/install_packages.sh build viewer; scripts/configure_programs.sh >/dev/null; }
+# Only where Cyclone DDS was found.
+[ ! -d "$build/apps/ros2/CMakeFiles/hapticd-ros2.dir" ] || targets+=(hapticd-ros2)
 cmake --build "$build" --target "${targets[@]}" >build/package.log 2>&1 || { tail -30 build/package.log; exit 1; }
 out=$source/build/package
 package "$build" "$out"

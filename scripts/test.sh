@@ -157,10 +157,10 @@ judge() {
 
 mkdir -p build
 if [ -z "$room" ]; then
-  scripts/install_packages.sh build viewer test python lint package sanitizers
+  scripts/install_packages.sh build viewer test python ros2 lint package sanitizers
   scripts/check_includes.sh
 else
-  scripts/install_packages.sh build test python
+  scripts/install_packages.sh build test python ros2
 fi
 
 # From here on this process takes only the processor time that the tests leave, for many of them watch what happens within

@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from typing import Any, Dict, Iterator, List, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Tuple
 
 import numpy as np
 import pytest
@@ -173,6 +173,22 @@ def feel_a_sphere(hand: Any, depth_mm: float = 3) -> None:
         hand.hold_hand((0, 0, 25 - depth_mm))
         if _wait(hand, lambda: hand.latest.force.force_N[2] > 0.2):
             return
+    raise AssertionError(f"felt nothing; poses {hand.latest.pose}, guard {hand.latest.guard}")
+
+
+def press(hand: Any, way: Iterable[Tuple[float, float, float]], felt: Callable[[], bool], **pose: Any) -> None:
+    """Moves the hand along `way`, in steps that it feels, until `felt`. Again, where a late tick had it jump into what it
+    should have touched."""
+    places = list(way)
+    for _ in range(10):
+        for place in places:
+            hand.hold_hand(place, **pose)
+            hand.run_for(0.05)
+        if _wait(hand, felt):
+            return
+        for place in reversed(places):
+            hand.hold_hand(place, **pose)
+            hand.run_for(0.05)
     raise AssertionError(f"felt nothing; poses {hand.latest.pose}, guard {hand.latest.guard}")
 
 

@@ -16,7 +16,7 @@ from hapticd import _openigtlink as igtl
 from hapticd import igtlink
 
 from conftest import Server, _wait
-from igtlink_bridge import Bridge
+from bridge_process import Bridge
 
 #: A model of four corners and two triangles.
 SQUARE = (

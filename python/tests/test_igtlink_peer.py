@@ -11,8 +11,8 @@ import numpy as np
 
 import hapticd
 
-from conftest import Server
-from igtlink_bridge import Bridge
+from conftest import Server, press
+from bridge_process import Bridge
 
 PEER = os.environ["HAPTICD_IGTLINK_PEER"]
 
@@ -39,7 +39,7 @@ class Peer:
 def wait(hand: hapticd.Client, condition: Any) -> None:
     deadline = time.monotonic() + 60
     while not condition():
-        assert time.monotonic() < deadline
+        assert time.monotonic() < deadline, (hand.latest.guard, hand.latest.force, hand.latest.pose)
         hand.poll(0.05)
 
 
@@ -55,9 +55,8 @@ def test_the_hand_touches_the_model_of_the_client(server: Server) -> None:
         wait(hand, lambda: peer.newest.get("CAPABILITY Phantom") == expected)
 
         # The plate's top is at A = 5 + 10 mm: z = 15 mm of the device. Slowly: a hand that jumps into it does not feel it.
-        for z_mm in np.arange(30, 11.9, -0.5):
-            hand.hold_hand((3, -4, z_mm), turned, buttons=2)
-            hand.run_for(0.05)
+        way = [(3, -4, z_mm) for z_mm in np.arange(30, 11.9, -0.5)]
+        press(hand, way, lambda: hand.latest.touched_object.object == 2, orientation=turned, buttons=2)
         wait(hand, lambda: abs(peer.matrix("PhantomProxy")[1, 3] - 15) < 0.01 and peer.matrix("PhantomHand")[1, 3] < 14)
         hand_A = peer.matrix("PhantomHand")[1, 3]
         for name, depth in (("PhantomHand", hand_A), ("PhantomProxy", 15)):

@@ -36,6 +36,10 @@ if [ "$name" = igtlink_peer ] && [ -z "${HAPTICD_IGTLINK_PEER:-}" ]; then
   echo "skipped: the library of OpenIGTLink is missing; install libopenigtlink-dev of packages.txt and configure again"
   exit 77
 fi
+if [ "$name" = ros2 ] && [ -z "${HAPTICD_ROS2_PEER:-}" ]; then
+  echo "skipped: Cyclone DDS or Fast DDS is missing; install cyclonedds-dev, cyclonedds-tools and libfastrtps-dev of packages.txt and configure again"
+  exit 77
+fi
 test=$(find "$source_dir/python" -name "test_$name.py" -print -quit)
 [ -n "$test" ] || { echo "no test_$name.py"; exit 1; }
 cd /

@@ -1,4 +1,4 @@
-"""The bridge to OpenIGTLink as a process, for the tests."""
+"""Bridges as processes, for the tests."""
 
 import atexit
 import re
@@ -11,22 +11,16 @@ from typing import List
 from conftest import Server
 
 
-class Bridge:
-    """One process of `python3 -m hapticd.igtlink`, on a free port."""
+class Process:
+    """One process, and what it prints."""
 
-    def __init__(self, server: Server, *options: str) -> None:
+    def __init__(self, command: List[str]) -> None:
         self.log: List[str] = []
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "hapticd.igtlink", "--server", server.tcp, "--listen", "127.0.0.1:0", *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         atexit.register(self.process.kill)  # of a test that fails
         self._changed = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self.port = int(self.wait_for(r"listening on 127\.0\.0\.1:([0-9]+) ").group(1))
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -49,3 +43,11 @@ class Bridge:
         assert self.process.wait(30) == 0, self.log
         self._reader.join(30)
         assert "Traceback" not in "".join(self.log), self.log
+
+
+class Bridge(Process):
+    """One process of `python3 -m hapticd.igtlink`, on a free port."""
+
+    def __init__(self, server: Server, *options: str) -> None:
+        super().__init__([sys.executable, "-m", "hapticd.igtlink", "--server", server.tcp, "--listen", "127.0.0.1:0", *options])
+        self.port = int(self.wait_for(r"listening on 127\.0\.0\.1:([0-9]+) ").group(1))
