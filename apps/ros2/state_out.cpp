@@ -52,7 +52,8 @@ StateOut::StateOut(Client& client, const Participant& participant, const Frame& 
     : client_(client),
       frame_(frame),
       base_(std::move(base)),
-      tfPeriod_(tfRate_Hz > 0 ? 1 / tfRate_Hz : 0),
+      tfPeriod_(std::chrono::duration_cast<Time::duration>(
+          std::chrono::duration<double>(tfRate_Hz > 0 ? 1 / tfRate_Hz : 0))),
       hand_(participant, geometry_msgs_msg_dds__PoseStamped__desc, "measured_cp"),
       velocity_(participant, geometry_msgs_msg_dds__TwistStamped__desc, "measured_cv"),
       force_(participant, geometry_msgs_msg_dds__WrenchStamped__desc, "measured_cf"),
@@ -110,12 +111,14 @@ void StateOut::writeTick(const TickReport& report) {
   proxy_.write(pose(report.time, report.proxy_m, report.orientation));
   depth_.write({report.depth_m});
   object_.write({report.object});
-  if (tfPeriod_.count() > 0 && report.time - transformsWritten_ >= tfPeriod_) writeTransforms(report);
+  if (tfPeriod_.count() > 0 && report.time >= transformsDue_) {
+    transformsDue_ = std::max(transformsDue_ + tfPeriod_, report.time);
+    writeTransforms(report);
+  }
   if (report.time - stateWritten_ >= kRepeat) writeState(report.time);
 }
 
 void StateOut::writeTransforms(const TickReport& report) {
-  transformsWritten_ = report.time;
   const std::string name = base_.substr(0, base_.rfind("_base"));
   const std::string frames[] = {name, name + "_proxy"};
   const auto rotation = quaternion(frame_.fromServer(report.orientation));

@@ -40,7 +40,7 @@ class StateOut {
   Client& client_;
   Frame frame_;
   std::string base_;
-  std::chrono::duration<double> tfPeriod_;
+  Time::duration tfPeriod_;
 
   Writer<PoseStamped> hand_;
   Writer<TwistStamped> velocity_;
@@ -57,7 +57,7 @@ class StateOut {
   Time buttonsWritten_;
   std::string stateText_;
   Time stateWritten_;
-  Time transformsWritten_;
+  Time transformsDue_;
   std::vector<ScopedSubscription> subscriptions_;
 };
 
