@@ -142,6 +142,13 @@ def test_the_hand_touches_the_mesh_of_the_node(server: Server, node: Node) -> No
         node.write("pose", "-", 0, 0, 0.005, 0, 0, 0, 1)  # down: away from the hand
         wait(hand, lambda: node.newest["contact/object"] == ["-1"] and np.allclose(node.numbers("measured_cf"), 0))
 
+        uploads = len(bridge.log)
+        node.write("newer", 0.004)  # by a newer version of the message
+        wait(hand, lambda: "object 2 is 'part': 2 triangles" in "".join(bridge.log[uploads:]))
+
+        node.write("plate", 0.004, 100)  # 0.7 MB
+        bridge.wait_for("object 2 is 'part': 20000 triangles")
+
         # What is wrong is left out.
         node.write("pose", "map", 0, 0, 0, 0, 0, 0, 1)
         bridge.wait_for(r"/Phantom/part/pose is ignored: frame_id is 'map'; transform the message into 'Phantom_base'")

@@ -4,8 +4,8 @@
 // Prints the samples that it receives, one line each: TOPIC FRAME NUMBERS AND TEXTS, in the order of the
 // message. Writes what standard input commands; the frame - is none:
 //   force FRAME 6 numbers     state TEXT     pose FRAME 7 numbers
-//   plate HEIGHT              broken (a vertex is not a number)     beyond (a triangle names a missing
-//   vertex)
+//   plate HEIGHT [CELLS]      newer HEIGHT: a later version of the message
+//   broken: a vertex is not a number     beyond: a triangle names a vertex that is not there
 #include <fastcdr/Cdr.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -19,7 +19,9 @@
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
@@ -237,16 +239,36 @@ class Message {
   Cdr cdr_;
 };
 
-// A square of 80 mm at this height along z, of two triangles.
-void writePlate(fast::DataWriter* writer, double height, std::uint32_t lastVertex) {
-  Message message;
-  message << std::uint32_t{2};
-  for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, lastVertex}) message << i;
-  message << std::uint32_t{4};
-  for (const auto& [x, y] : {std::pair{-0.04, -0.04}, {0.04, -0.04}, {0.04, 0.04}, {-0.04, 0.04}})
-    message << x << y << height;
-  message.write(writer);
-}
+// A square of 80 mm at this height along z, of cells x cells squares of two triangles. The newer version of
+// the message ends with the colours and normals of its vertices.
+struct Plate {
+  double height = 0;
+  std::uint32_t cells = 1;
+  std::uint32_t lastVertex = 0;  // in place of the first one of the last triangle
+  bool newer = false;
+
+  void write(fast::DataWriter* writer) const {
+    Message message;
+    message << 2 * cells * cells;
+    for (std::uint32_t i = 0; i < cells * cells; ++i) {
+      const std::uint32_t a = i / cells * (cells + 1) + i % cells;
+      const std::uint32_t b = a + cells + 1;
+      const bool last = lastVertex > 0 && i + 1 == cells * cells;
+      for (const std::uint32_t corner : {a, a + 1, b, last ? lastVertex : a + 1, b + 1, b}) message << corner;
+    }
+    const std::uint32_t vertices = (cells + 1) * (cells + 1);
+    message << vertices;
+    for (std::uint32_t i = 0; i < vertices; ++i)
+      message << 0.08 * (i % (cells + 1)) / cells - 0.04 << 0.08 * (i / (cells + 1)) / cells - 0.04 << height;
+    if (newer) {
+      message << vertices;
+      for (std::uint32_t i = 0; i < 4 * vertices; ++i) message << 0.5F;
+      message << vertices;
+      for (std::uint32_t i = 0; i < 3 * vertices; ++i) message << 1.0;
+    }
+    message.write(writer);
+  }
+};
 
 }  // namespace
 
@@ -279,12 +301,15 @@ int main(int count, char** arguments) {
     std::string command;
     std::string frame;
     words >> command;
-    if (command == "plate" || command == "broken") {
-      double height = 0;
-      words >> height;
-      writePlate(mesh, command == "plate" ? height : std::nan(""), 3);
+    if (command == "plate" || command == "newer") {
+      Plate plate{.newer = command == "newer"};
+      words >> plate.height >> plate.cells;
+      plate.cells = std::max(plate.cells, 1U);  // 0 where nothing was given
+      plate.write(mesh);
+    } else if (command == "broken") {
+      Plate{.height = std::nan("")}.write(mesh);
     } else if (command == "beyond") {
-      writePlate(mesh, 0, 4);
+      Plate{.lastVertex = 4}.write(mesh);
     } else {
       words >> frame;
       Message message;
