@@ -1,31 +1,38 @@
 // hapticd-ros2: one device of a haptics server as topics of ROS 2, by DDS and without an installation of ROS.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <memory>
+#include <optional>
 #include <regex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "../commands.h"
 #include "../token_file.h"
 #include "base/printable.h"
-#include "commands_in.h"
+#include "control_in.h"
 #include "hapticd/client.h"
+#include "hapticd/error.h"
+#include "objects_in.h"
 #include "participant.h"
 #include "state_out.h"
+#include "topic_log.h"
 
 namespace {
 
 using namespace std::chrono_literals;
 namespace ros2 = hapticd::apps::ros2;
 
-volatile std::sig_atomic_t ending = 0;
+std::atomic<int> ending = 0;  // set by signals, too
+static_assert(std::atomic<int>::is_always_lock_free);
+std::atomic<bool> failed = false;
 
 struct Options {
   std::string server = "Phantom@localhost";
@@ -38,6 +45,13 @@ struct Options {
   double rate_Hz = 200;
   double tfRate_Hz = 50;
   ros2::ObjectSettings objects{{}, 0, {.stiffness = 0.8F}};
+};
+
+/// What all topics share.
+struct Bridge {
+  ros2::Participant participant;
+  ros2::Frame frame;
+  std::string base;  // frame_id
 };
 
 // A name of ROS: letters, digits and underscores, with a digit not first.
@@ -119,44 +133,87 @@ void endOnSignals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 
+// What the server says of the client's commands, and of its device.
+void logTexts(hapticd::Client& client, hapticd::Severity least) {
+  client.onText([least](const hapticd::TextReport& report) {
+    if (report.severity >= least)
+      ros2::log("server: " + std::string(nameOf(report.severity)) + ": " + report.text);
+  });
+}
+
+// Calls what a lost connection ends: the client reports it, and connects again.
+template <class Call>
+void whileConnected(Call&& call) {
+  try {
+    call();
+  } catch (const hapticd::ConnectionLost&) {  // NOLINT(bugprone-empty-catch)
+  } catch (const hapticd::ConnectError&) {    // NOLINT(bugprone-empty-catch)
+  }
+}
+
+hapticd::Client connect(const Options& options, const std::string& token) {
+  hapticd::Client client(options.server);
+  if (!token.empty()) client.presentToken(token);
+  return client;
+}
+
+// Serves the objects by a client of its own, so that nothing else waits behind a large mesh.
+void serveObjects(const Options& options, const Bridge& bridge, const std::string& token) try {
+  hapticd::Client client = connect(options, token);
+  logTexts(client, hapticd::Severity::error);
+  client.subscribe(hapticd::Reports::none);
+  ros2::ObjectsIn objects(client, bridge.participant, bridge.frame, bridge.base, options.objects);
+  while (ending == 0) {
+    client.poll(5ms);
+    whileConnected([&] { objects.take(); });
+  }
+  whileConnected([&] {
+    objects.clear();
+    client.flushAll();
+  });
+} catch (const std::exception& error) {
+  ros2::log(std::string("objects: ") + error.what());
+  failed = true;
+  ending = 1;
+}
+
 void run(Options options) {
   const auto& names = options.objects.names;
   for (auto name = names.begin(); name != names.end(); ++name)
     if (std::find(names.begin(), name, *name) != name)
       throw std::runtime_error("--object '" + *name + "' is given twice");
   const std::string token = hapticd::apps::tokenFor(options.server, options.tokenFile);
-  hapticd::Client client(options.server);
-  if (!token.empty()) client.presentToken(token);
-  client.onText([](const hapticd::TextReport& report) {
-    if (report.severity != hapticd::Severity::normal)
-      ros2::log("server: " + std::string(nameOf(report.severity)) + ": " + report.text);
-  });
+  hapticd::Client client = connect(options, token);
+  logTexts(client, hapticd::Severity::warning);
   client.onConnection([&](const hapticd::ConnectionReport& report) {
     ros2::log((report.connected ? "connected to " : "lost ") + client.server() +
               (report.connected ? "" : ": " + report.reason));
   });
   client.subscribe(hapticd::Reports::tick | hapticd::Reports::hand, options.rate_Hz);
 
-  const std::string name = rosName(client.device());
-  if (options.nameSpace.empty()) options.nameSpace = "/" + name;
-  const ros2::Frame frame = options.frame == "ros" ? ros2::Frame::ros() : ros2::Frame::device();
-  const ros2::Participant participant(options.domain, options.network, options.nameSpace);
-  const ros2::StateOut out(client, participant, frame, name + "_base", options.tfRate_Hz);
-  std::unique_ptr<ros2::CommandsIn> in;
-  if (!options.readOnly)
-    in = std::make_unique<ros2::CommandsIn>(client, participant, frame, name + "_base", options.objects);
+  if (options.nameSpace.empty()) options.nameSpace = "/" + rosName(client.device());
+  const std::string name = options.nameSpace.substr(options.nameSpace.rfind('/') + 1);
+  const Bridge bridge{{options.domain, options.network, options.nameSpace},
+                      options.frame == "ros" ? ros2::Frame::ros() : ros2::Frame::device(),
+                      name + "_base"};
+  const ros2::StateOut out(client, bridge.participant, bridge.frame, name, options.tfRate_Hz);
+  std::optional<ros2::ControlIn> control;
+  std::jthread objects;
+  if (!options.readOnly) {
+    control.emplace(client, bridge.participant, bridge.frame, bridge.base);
+    if (!names.empty()) objects = std::jthread([&] { serveObjects(options, bridge, token); });
+  }
   ros2::log("topics below " + options.nameSpace + " in DDS domain " + std::to_string(options.domain) +
             (options.network ? ", on the network" : ", on this machine") + "; Ctrl-C ends");
-  if (options.network && in)
+  if (options.network && control)
     ros2::log(
         "warning: DDS has no passwords here: whoever reaches it can put forces on the hand; let in "
         "machines that you trust only, or use --read-only");
   while (ending == 0) {
     client.poll(1ms);
-    if (in) in->take();
+    if (control) whileConnected([&] { control->take(); });
   }
-  if (in) in->end();
-  client.flushAll();
+  if (objects.joinable()) objects.join();
   ros2::log("ended");
 }
 
@@ -175,5 +232,5 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "hapticd-ros2: %s\n", hapticd::base::printable(error.what()).c_str());
     return 1;
   }
-  return 0;
+  return failed ? 1 : 0;
 }

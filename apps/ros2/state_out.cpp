@@ -47,11 +47,13 @@ const char* stateOf(const GuardReport& guard) {
 
 }  // namespace
 
-StateOut::StateOut(Client& client, const Participant& participant, const Frame& frame, std::string base,
-                   double tfRate_Hz)
+StateOut::StateOut(Client& client, const Participant& participant, const Frame& frame,
+                   const std::string& name, double tfRate_Hz)
     : client_(client),
       frame_(frame),
-      base_(std::move(base)),
+      handFrame_(name),
+      proxyFrame_(name + "_proxy"),
+      base_(name + "_base"),
       tfPeriod_(std::chrono::duration_cast<Time::duration>(
           std::chrono::duration<double>(tfRate_Hz > 0 ? 1 / tfRate_Hz : 0))),
       hand_(participant, geometry_msgs_msg_dds__PoseStamped__desc, "measured_cp"),
@@ -119,12 +121,10 @@ void StateOut::writeTick(const TickReport& report) {
 }
 
 void StateOut::writeTransforms(const TickReport& report) {
-  const std::string name = base_.substr(0, base_.rfind("_base"));
-  const std::string frames[] = {name, name + "_proxy"};
   const auto rotation = quaternion(frame_.fromServer(report.orientation));
   geometry_msgs_msg_dds__TransformStamped_ both[] = {
-      {header(report.time, base_), text(frames[0]), {vector(frame_.fromServer(report.hand_m)), rotation}},
-      {header(report.time, base_), text(frames[1]), {vector(frame_.fromServer(report.proxy_m)), rotation}}};
+      {header(report.time, base_), text(handFrame_), {vector(frame_.fromServer(report.hand_m)), rotation}},
+      {header(report.time, base_), text(proxyFrame_), {vector(frame_.fromServer(report.proxy_m)), rotation}}};
   transforms_.write({borrowed<dds_sequence_geometry_msgs_msg_dds__TransformStamped_>(both, 2)});
 }
 

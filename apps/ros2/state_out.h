@@ -22,9 +22,9 @@ using WrenchStamped = geometry_msgs_msg_dds__WrenchStamped_;
 /// Collaborative Robotics Toolkit where it has one.
 class StateOut {
  public:
-  /// `base`: the frame_id of the device's base. `tfRate_Hz`: of /tf, 0: none. Client and participant outlive
-  /// it.
-  StateOut(Client& client, const Participant& participant, const Frame& frame, std::string base,
+  /// `name`: of the hand's frame on /tf; those of proxy and base are NAME_proxy and NAME_base. `tfRate_Hz`:
+  /// of /tf, 0: none. Client and participant outlive it.
+  StateOut(Client& client, const Participant& participant, const Frame& frame, const std::string& name,
            double tfRate_Hz);
   StateOut(const StateOut&) = delete;
   StateOut& operator=(const StateOut&) = delete;
@@ -39,6 +39,8 @@ class StateOut {
 
   Client& client_;
   Frame frame_;
+  std::string handFrame_;
+  std::string proxyFrame_;
   std::string base_;
   Time::duration tfPeriod_;
 

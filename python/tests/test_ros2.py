@@ -223,6 +223,8 @@ def test_a_server_that_is_restarted_has_the_objects_again(node: Node) -> None:
     deadline = time.monotonic() + 60
     while node.newest["operating_state"][1:3] != ["FAULT", "0"]:
         assert time.monotonic() < deadline
+        node.write("force", "-", 0, 0, 0.1, 0, 0, 0)  # to nobody
+        node.write("pose", "-", 0, 0, 0, 0, 0, 0, 1)
         time.sleep(0.02)
     server.start(f"127.0.0.1:{port}")
     while uploads() == before or node.newest["operating_state"][1:3] != ["ENABLED", "1"]:

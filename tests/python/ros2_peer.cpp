@@ -258,8 +258,10 @@ struct Plate {
     }
     const std::uint32_t vertices = (cells + 1) * (cells + 1);
     message << vertices;
-    for (std::uint32_t i = 0; i < vertices; ++i)
-      message << 0.08 * (i % (cells + 1)) / cells - 0.04 << 0.08 * (i / (cells + 1)) / cells - 0.04 << height;
+    const double step = 0.08 / cells;
+    for (std::uint32_t row = 0; row <= cells; ++row)
+      for (std::uint32_t column = 0; column <= cells; ++column)
+        message << step * column - 0.04 << step * row - 0.04 << height;
     if (newer) {
       message << vertices;
       for (std::uint32_t i = 0; i < 4 * vertices; ++i) message << 0.5F;
