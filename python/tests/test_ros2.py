@@ -116,6 +116,14 @@ def test_the_node_reads_the_hand(server: Server, node: Node) -> None:
             hand.run_for(0.01)
             fastest = max(fastest, node.numbers("measured_cv")[0])
         assert 0.03 < fastest < 1, fastest
+
+        # And to the left, about the axis that points up.
+        turning = np.zeros(3)
+        for angle in np.arange(0, 1.5, 0.025):
+            hand.hold_hand((3, -4, -30), (0, np.sin(angle / 2), 0, np.cos(angle / 2)))
+            hand.run_for(0.01)
+            turning = max(turning, node.numbers("measured_cv")[3:], key=lambda v: v[2])
+        assert 0.3 < turning[2] < 20 and abs(turning[:2]).max() < 0.05 * turning[2], turning
     bridge.stop()
 
 
