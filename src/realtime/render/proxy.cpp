@@ -48,9 +48,10 @@ bool creeps(const Vec3& velocity_m_per_s, const ContactConstraint& constraint) {
 
 }  // namespace
 
-const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, double period_s,
-                                std::uint32_t& status) noexcept {
+const ContactSet& Proxy::follow(const SceneAtTime& now, const Vec3& hip, const Vec3& hipVelocity_m_per_s,
+                                double period_s, std::uint32_t& status) noexcept {
   now_ = now;
+  hipVelocity_m_per_s_ = hipVelocity_m_per_s;
   period_s_ = period_s;
   casts_ = 0;
   search_.visits = 0;
@@ -194,7 +195,7 @@ void Proxy::updateProxy(const Vec3& hip) noexcept {
     return;
   }
   if (displaced && slideInMovingGroove(hip, active)) return;
-  // Friction of what is near, and not touched, holds nothing.
+  // Friction of what is near, and not touched or not pressed, holds nothing.
   contactSet_.staticShare = 1;  // also where the dynamic coefficient is 0
   if (frictionConeOf(contactSet_) == 0) return updateWithoutFriction(hip, active);
   const Vec3 held = heldBySlope();
@@ -517,6 +518,7 @@ void Proxy::updateContactSet(const Vec3& hip, const Vec3& goal, const ActiveSet&
   const bool free = contactSet_.normal_m.isZero(0);  // then only the report is left to find
   if (toolRadius_ == 0 && onAll && (arrived || free)) reported_ = onFaces(hip, active);
   contactSet_.spring = blendedSpring(now_, query_, planes_, toolRadius_, reported_, contactSet_);
+  findPressure();
 }
 
 // The proxy on the faces that hold it, at their skins so that rounding does not put it behind one of them.

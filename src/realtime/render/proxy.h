@@ -38,6 +38,12 @@ struct ContactConstraint {
   Vec3 carried_m = Vec3::Zero();                ///< way of the surface there in this tick, with the view
   bool rests = true;                            ///< the surface neither moves nor deforms in this tick
   bool creeps = false;                          ///< or so slowly that its work is negligible
+  double pressed = 1;  ///< share of the spring that presses: the damper of a HIP that leaves takes the rest
+
+  /// Of the HIP from the surface, along the normal, metres per second.
+  double leavingSpeed(const Vec3& hipVelocity_m_per_s) const noexcept {
+    return halfSpace.normal.dot(hipVelocity_m_per_s - surfaceVelocity_m_per_s);
+  }
 };
 
 /// The faces in contact: proxy - HIP = normal_m + lateral_m.
@@ -59,7 +65,7 @@ struct ContactSet {
   }
   /// The bound of friction and adhesion of one constraint, as a length of the spring.
   double boundOf(const ContactConstraint& constraint) const noexcept {
-    return frictionOf(constraint.surface) * constraint.depth_m +
+    return frictionOf(constraint.surface) * constraint.pressed * constraint.depth_m +
            constraint.adhesion_N / spring.stiffness_N_per_m;
   }
 };
@@ -79,8 +85,8 @@ class Proxy {
 
   /// One tick: moves the proxy with the geometry, then towards the HIP, and returns what holds it. Adds
   /// RenderStatus bits to `status`.
-  const ContactSet& follow(const SceneAtTime& now, const Vec3& hip, double period_s,
-                           std::uint32_t& status) noexcept;
+  const ContactSet& follow(const SceneAtTime& now, const Vec3& hip, const Vec3& hipVelocity_m_per_s,
+                           double period_s, std::uint32_t& status) noexcept;
 
   /// Where the proxy is: for a point tool in contact on the faces themselves, without the standoff.
   const Vec3& position() const noexcept { return reported_; }
@@ -227,6 +233,7 @@ class Proxy {
   void rememberConstraints() noexcept;
   bool frictionless() const noexcept;
   static double frictionConeOf(const ContactSet& contactSet) noexcept;
+  void findPressure() noexcept;
   Vec3 heldBySlope() const noexcept;
   bool slips() noexcept;
   void pressBack(const Vec3& hip, ActiveSet& active) noexcept;
@@ -273,6 +280,7 @@ class Proxy {
   Vec3 reported_ = Vec3::Zero();
   Vec3 positionBefore_ = Vec3::Zero();
   Vec3 hipBefore_ = Vec3::Zero();
+  Vec3 hipVelocity_m_per_s_ = Vec3::Zero();
   Slide slide_;
   Search search_;
   ContactSet contactSet_;

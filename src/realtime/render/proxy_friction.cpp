@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "realtime/render/proxy.h"
+#include "realtime/render/surface_law.h"
+#include "realtime/render/yielding.h"
 
 namespace hapticd::realtime {
 namespace {
@@ -20,6 +22,22 @@ double balanceOf(double spring, double first, double boundOfFirst, double second
 }
 
 }  // namespace
+
+// The damper of a HIP that leaves takes a part of the pressure, and friction bears what the rest of it
+// allows. A proxy that stuck beyond that would fill a spring into which the hand puts nothing.
+void Proxy::findPressure() noexcept {
+  const auto first = contactSet_.constraints.begin();
+  const auto damps = [this](const ContactConstraint& c) {
+    return c.surface.damping_Ns_per_m > 0 && c.leavingSpeed(hipVelocity_m_per_s_) > 0;
+  };
+  if (std::none_of(first, first + contactSet_.count, damps)) return;
+  const Springs springs = springsOf(contactSet_, toolRadius_);
+  const std::array<double, kMaxActive> pressed_N = normalForces(contactSet_, springs, hipVelocity_m_per_s_);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(contactSet_.count); ++i) {
+    const double spring_N = springs.forces_N[i];
+    if (pressed_N[i] < spring_N) contactSet_.constraints[i].pressed = pressed_N[i] / spring_N;
+  }
+}
 
 // What the slope of the stiffness holds of the lateral part, as a length of the spring.
 Vec3 Proxy::heldBySlope() const noexcept {

@@ -185,7 +185,8 @@ void Renderer::step(const scene::SceneSnapshot& scene, const device::DeviceState
   }
   const double radius = s.options.toolRadius_m;
   const double period_s = std::max(base::toSeconds(period), kShortestPeriod_s);
-  const ContactSet& contactSet = s.proxy.follow({&scene, now}, hip, period_s, out.status);
+  const ContactSet& contactSet =
+      s.proxy.follow({&scene, now}, hip, device.velocity_m_per_s, period_s, out.status);
   out.proxy_m = out.scp_m = s.proxy.position();
   const Springs forces = springsOf(contactSet, radius);
   if ((out.status & kRenderReleased) == 0)

@@ -31,7 +31,7 @@ double dampingShare(const ContactSet& contactSet, int face) {
 // Spring and damper along the normal. The damper may reduce the force, but the surface never pulls.
 double normalForce(const ContactConstraint& constraint, double spring_N, double dampingShare,
                    const Vec3& hipVelocity) {
-  const double leaving = constraint.halfSpace.normal.dot(hipVelocity - constraint.surfaceVelocity_m_per_s);
+  const double leaving = constraint.leavingSpeed(hipVelocity);
   return std::max(0.0, spring_N - dampingShare * constraint.surface.damping_Ns_per_m * leaving);
 }
 
@@ -53,13 +53,14 @@ using ContactShares = std::array<ContactShare, kMaxActive>;
 // The face with the largest force gives point and normal of its object's contact.
 void addNormalForces(const ContactSet& contactSet, const Springs& springs, const Vec3& proxy_m,
                      const Vec3& hipVelocity, double toolRadius_m, ContactShares& shares, Rendering& out) {
+  const std::array<double, kMaxActive> forces_N = normalForces(contactSet, springs, hipVelocity);
   Vec3 unshaded = Vec3::Zero();
   for (int i = 0; i < contactSet.count; ++i) {
     const ContactConstraint& constraint = contactSet.constraints[static_cast<std::size_t>(i)];
     ContactShare& share = shares[static_cast<std::size_t>(i)];
     share.contact = &contactWith(constraint.object, out);
     share.spring_N = springs.forces_N[static_cast<std::size_t>(i)];
-    share.normal_N = normalForce(constraint, share.spring_N, dampingShare(contactSet, i), hipVelocity);
+    share.normal_N = forces_N[static_cast<std::size_t>(i)];
     share.friction_N = contactSet.frictionOf(constraint.surface) * share.normal_N + constraint.adhesion_N;
     share.contact->force_N += share.normal_N * constraint.forceDirection;
     out.normalForce_N += share.normal_N * constraint.forceDirection;
@@ -96,16 +97,6 @@ void distribute(const Vec3& force, const ContactShares& shares, int count, Part&
   }
 }
 
-// Share of `added` with which it and `force` are together at most `most`, which `force` alone does not
-// exceed.
-double shareUpTo(double most, const Vec3& force, const Vec3& added) {
-  if ((force + added).norm() <= most) return 1;
-  const double a = added.squaredNorm();
-  const double b = force.dot(added);
-  const double c = std::min(0.0, force.squaredNorm() - most * most);
-  return std::clamp((std::sqrt(b * b - a * c) - b) / a, 0.0, 1.0);
-}
-
 // The slope of the stiffness pushes along the surfaces. Friction and adhesion bear what else the lateral part
 // of the spring exerts, each contact within its bound.
 void addTangentialForces(const ContactSet& contactSet, const Springs& springs, const ContactShares& shares,
@@ -131,12 +122,7 @@ void addTangentialForces(const ContactSet& contactSet, const Springs& springs, c
   const Vec3 lateral = stiffness * contactSet.lateral_m - stretch * stretch * contactSet.spring.slope_N;
   const double force = lateral.norm();
   if (!(force > 0)) return;
-  double share = std::min(1.0, bound / force);
-  if (springs.yields) {
-    // The springs may point elsewhere than the depths, which friction is across.
-    const Vec3 displacement = contactSet.normal_m + contactSet.lateral_m;
-    share *= shareUpTo(contactSet.spring.stiffness_N_per_m * displacement.norm(), spring, share * lateral);
-  }
+  const double share = std::min(1.0, bound / force);
   const Vec3 friction = share * lateral;
   out.contactForce_N += friction;
   if (contactSet.borneApart) {
@@ -149,6 +135,17 @@ void addTangentialForces(const ContactSet& contactSet, const Springs& springs, c
 }
 
 }  // namespace
+
+std::array<double, kMaxActive> normalForces(const ContactSet& contactSet, const Springs& springs,
+                                            const Vec3& hipVelocity_m_per_s) noexcept {
+  std::array<double, kMaxActive> forces_N{};
+  for (int i = 0; i < contactSet.count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    forces_N[k] = normalForce(contactSet.constraints[k], springs.forces_N[k], dampingShare(contactSet, i),
+                              hipVelocity_m_per_s);
+  }
+  return forces_N;
+}
 
 void applySurfaceLaw(const ContactSet& contactSet, const Springs& springs, const Vec3& proxy_m,
                      const Vec3& hipVelocity_m_per_s, double toolRadius_m, Rendering& out) noexcept {

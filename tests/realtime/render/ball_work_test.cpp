@@ -24,7 +24,8 @@ class Ball {
   /// What is felt of a surface of 1000 N/m.
   double at(const Vec3& hip) {
     status_ = 0;
-    const ContactSet& felt = proxy_->follow({snapshot_.get(), now_ += kTick}, hip, 1e-3, status_);
+    const ContactSet& felt =
+        proxy_->follow({snapshot_.get(), now_ += kTick}, hip, Vec3::Zero(), 1e-3, status_);
     return felt.count == 0 ? 0 : 1000 * (felt.normal_m + felt.lateral_m).norm() * proxy_->feltShare();
   }
   int visits() const { return proxy_->visits(); }

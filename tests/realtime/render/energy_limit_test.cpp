@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -187,6 +188,32 @@ TEST(EnergyShareOfOneStiffness, Is_whole_on_a_rough_body) {
     ASSERT_EQ(hand.renderer().energyShare(), 1) << "tick " << i << ", interrupted " << interrupted;
   }
   EXPECT_GT(interrupted, 0);
+}
+
+// The dampers of a hand that leaves take the pressure, and the friction of the walls lets the proxy go.
+TEST(EnergyShareOfOneStiffness, Is_whole_in_damped_grooves) {
+  std::mt19937 random(2);
+  const auto number = [&random](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+  };
+  for (int groove = 0; groove < reduced(100); ++groove) {
+    SceneFixture scene;
+    const double stiffness = number(100, 2000);
+    for (const double side : {-1.0, 1.0}) {
+      scene::Surface wall = surface(stiffness, number(0.5, 1.2), number(0, 0.5));
+      wall.damping_Ns_per_m = number(0, 2);
+      scene.add(plane(0.1), wall, Affine(Eigen::AngleAxisd(side * number(0.1, 1.2), Vec3::UnitY())));
+    }
+    Hand hand(scene.snapshot());
+    hand.at(0.01 * Vec3::UnitZ());
+    for (int stroke = 0; stroke < 20; ++stroke) {
+      const Vec3 end(number(-0.003, 0.003), number(-0.01, 0.01), number(-0.003, 0.001));
+      double share = 1;
+      hand.to(end, number(0.02, 0.5),
+              [&](const Rendering&) { share = std::min(share, hand.renderer().energyShare()); });
+      ASSERT_GT(share, 1 - 1e-6) << "groove " << groove << ", stroke " << stroke;
+    }
+  }
 }
 
 }  // namespace

@@ -116,7 +116,7 @@ TEST_P(Pit, takes_few_casts) {
   int facetCasts = 0;
   const auto at = [&](const Vec3& hip) {
     std::uint32_t status = 0;
-    proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+    proxy->follow({snapshot.get(), now += kTick}, hip, Vec3::Zero(), 1e-3, status);
     casts = std::max(casts, proxy->casts());
     facetCasts = std::max(facetCasts, proxy->facetCasts());
   };
@@ -161,7 +161,8 @@ TEST_P(Star, takes_no_more_work_than_a_tick_has) {
   int lost = 0;
   const auto at = [&](const Vec3& hip) {
     std::uint32_t status = 0;
-    const ContactSet& contact = proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+    const ContactSet& contact =
+        proxy->follow({snapshot.get(), now += kTick}, hip, Vec3::Zero(), 1e-3, status);
     visits = std::max(visits, proxy->visits());
     facetCasts = std::max(facetCasts, proxy->facetCasts());
     return contact.count > 0 && proxy->feltShare() == 1;

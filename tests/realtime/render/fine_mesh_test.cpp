@@ -188,7 +188,7 @@ TEST(FineSheet, that_moves_is_examined_in_part) {
   for (int i = 0; i < 200; ++i) {
     std::uint32_t status = 0;
     proxy->follow({snapshot.get(), (i + 1) * kTick}, {0, 0, kRadius + std::max(-0.001, 0.001 - 50e-6 * i)},
-                  1e-3, status);
+                  Vec3::Zero(), 1e-3, status);
     visits.push_back(proxy->visits());
   }
   std::nth_element(visits.begin(), visits.begin() + 100, visits.end());
@@ -218,7 +218,7 @@ TEST(FineSheet, leaves_nothing_behind_once_forgotten) {
     std::vector<std::tuple<std::uint32_t, Vec3, int>> felt;
     const auto at = [&](const Vec3& hip) {
       std::uint32_t status = 0;
-      proxy->follow({snapshot.get(), now += kTick}, hip, 1e-3, status);
+      proxy->follow({snapshot.get(), now += kTick}, hip, Vec3::Zero(), 1e-3, status);
       felt.emplace_back(status, proxy->position(), proxy->visits());
     };
     for (int i = 0; std::isfinite(strokedAt_m) && i < 400; ++i)

@@ -1,5 +1,8 @@
 // Coulomb friction: T3, T9b, T12 (without friction, for the energy) and T19 of the ground truth.
+#include <random>
+
 #include "base/time.h"
+#include "reduced.h"
 #include "variants.h"
 
 namespace hapticd::realtime::fixture {
@@ -114,6 +117,47 @@ TEST_P(FrictionTest, sliding_plate_carries_the_proxy_until_it_slips) {
     slipped = slipped || moved > 0.001;
   }
   EXPECT_TRUE(slipped);
+}
+
+// Friction bears what the damper leaves of the pressure. The expected spring along a floor is cut to that in
+// each tick, and what was cut is gone.
+TEST_P(FrictionTest, slips_where_the_damper_takes_the_pressure) {
+  std::mt19937 random(1);
+  const auto number = [&random](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+  };
+  const int floors = reduced(40);
+  for (int floor = 0; floor < floors; ++floor) {
+    scene::Surface s = surface(number(100, 2000));
+    s.damping_Ns_per_m = number(0, 2);
+    s.staticFriction = s.dynamicFriction = number(0.1, 1.2);
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+    add(plane(0.1, 10), s);
+    start({0.0003, 0.0002, 0.001});
+    Vec3 sideways = Vec3::Zero();
+    Vec3 last = hip();
+    double missed_N = 0;
+    double share = 1;
+    for (int stroke = 0; stroke < 10; ++stroke) {
+      const Vec3 end(number(-0.01, 0.01), number(-0.01, 0.01), number(-0.003, -0.0001));
+      to(end, number(0.02, 0.5), [&](const Rendering& r) {
+        const Vec3 move = hip() - last;
+        last = hip();
+        const double spring_N = -s.stiffness_N_per_m * hip().z();
+        if (spring_N <= 1e-6) return;
+        const double pressed_N = std::max(0.0, spring_N - s.damping_Ns_per_m * move.z() / 1e-3);
+        const double bound_m = s.staticFriction * std::min(spring_N, pressed_N) / s.stiffness_N_per_m;
+        sideways -= Vec3(move.x(), move.y(), 0);
+        if (sideways.norm() > bound_m) sideways = bound_m * sideways.normalized();
+        const Vec3 expected_N = pressed_N * Vec3::UnitZ() + s.stiffness_N_per_m * sideways;
+        missed_N = std::max(missed_N, (r.force_N - expected_N).norm());
+        share = std::min(share, hand->renderer().energyShare());
+      });
+      ASSERT_LT(missed_N, 2e-4) << "floor " << floor << ", stroke " << stroke;
+      ASSERT_EQ(share, 1) << "floor " << floor << ", stroke " << stroke;
+    }
+  }
 }
 
 // T12  press, slide, return and release on a bumpy sphere without friction: no energy is gained. (Some may be
