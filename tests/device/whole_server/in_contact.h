@@ -114,7 +114,8 @@ class InContact : public testing::Test {
     visitor.emplace(address);
     scene.upload(visitor->client());
   }
-  // In from the air, again and again: what a stall took comes back there.
+  // In from the air, again and again: what a stall took comes back there. A stall in the depth releases the
+  // hand behind the sheet, which then holds it there from below: without the sheet it gets out.
   bool pressJoystick(EventKernel& kernel, device::FakeJoystick& joystick) {
     const auto glide = [&](double from, double to) {
       for (int i = 1; i <= 40; ++i) {
@@ -128,6 +129,9 @@ class InContact : public testing::Test {
       visitor->client().runFor(600ms);
       if (joystick.force().second > 0.1) return true;
       glide(-0.1, 0.1);
+      visitor->client().resetScene();
+      visitor->client().runFor(100ms);
+      scene.upload(visitor->client());
       return false;
     });
   }
