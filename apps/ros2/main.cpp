@@ -11,6 +11,7 @@
 #include <optional>
 #include <regex>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -158,12 +159,13 @@ hapticd::Client connect(const Options& options, const std::string& token) {
 }
 
 // Serves the objects by a client of its own, so that nothing else waits behind a large mesh.
-void serveObjects(const Options& options, const Bridge& bridge, const std::string& token) try {
+void serveObjects(const std::stop_token& stop, const Options& options, const Bridge& bridge,
+                  const std::string& token) try {
   hapticd::Client client = connect(options, token);
   logTexts(client, hapticd::Severity::error);
   client.subscribe(hapticd::Reports::none);
   ros2::ObjectsIn objects(client, bridge.participant, bridge.frame, bridge.base, options.objects);
-  while (ending == 0) {
+  while (ending == 0 && !stop.stop_requested()) {
     client.poll(5ms);
     whileConnected([&] { objects.take(); });
   }
@@ -201,7 +203,9 @@ void run(Options options) {
   std::jthread objects;
   if (!options.readOnly) {
     control.emplace(client, bridge.participant, bridge.frame, bridge.base);
-    if (!names.empty()) objects = std::jthread([&] { serveObjects(options, bridge, token); });
+    if (!names.empty())
+      objects =
+          std::jthread([&](const std::stop_token& stop) { serveObjects(stop, options, bridge, token); });
   }
   ros2::log("topics below " + options.nameSpace + " in DDS domain " + std::to_string(options.domain) +
             (options.network ? ", on the network" : ", on this machine") + "; Ctrl-C ends");
@@ -224,7 +228,11 @@ int main(int count, char** arguments) {
   CLI::App app("One device of a haptics server as topics of ROS 2, by DDS: it needs no installation of ROS.",
                "hapticd-ros2");
   addOptions(app, options);
-  CLI11_PARSE(app, count, arguments);
+  try {
+    app.parse(count, arguments);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;  // as hapticd
+  }
   try {
     endOnSignals();
     run(options);

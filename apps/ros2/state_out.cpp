@@ -131,8 +131,8 @@ void StateOut::writeTransforms(const TickReport& report) {
 void StateOut::writeState(Time time) {
   stateWritten_ = time;
   // Without its server the device is not under control.
-  stateText_ = client_.connected() ? stateOf(client_.latest().guard) : "FAULT";
-  state_.write({header(time, base_), text(stateText_), client_.connected(), false});
+  const std::string state = client_.connected() ? stateOf(client_.latest().guard) : "FAULT";
+  state_.write({header(time, base_), text(state), client_.connected(), false});
 }
 
 }  // namespace hapticd::apps::ros2

@@ -57,7 +57,6 @@ class StateOut {
 
   std::optional<std::uint32_t> pressed_;
   Time buttonsWritten_;
-  std::string stateText_;
   Time stateWritten_;
   Time transformsDue_;
   std::vector<ScopedSubscription> subscriptions_;

@@ -1,4 +1,5 @@
-// Where the objects that move are, for pictures: evaluated for the time of a tick, as the servo did.
+// Where the objects that move are, for pictures: evaluated for the time of a tick with
+// the newest motions, which a late tick may not have taken over yet.
 #pragma once
 
 #include <cstddef>
