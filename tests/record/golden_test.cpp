@@ -227,7 +227,7 @@ TEST(Golden, DISABLED_WritesTheFiles) {
   markAsVersion1WithoutLaw(folder / "all_commands_v1.haptics");
   std::ofstream(folder / "all_commands.jsonl") << commandsOf(folder / "all_commands_v1.haptics");
   writeRecording(folder / "gripper_v2.haptics", true, 130);
-  writeRecording(folder / "all_commands_law40.haptics", false, 370, 210, 340);
+  writeRecording(folder / "all_commands_law41.haptics", false, 370, 210, 340);
 }
 
 const std::filesystem::path kFolder = std::filesystem::path(HAPTICD_TESTDATA) / "recordings";
@@ -308,7 +308,7 @@ INSTANTIATE_TEST_SUITE_P(
         GoldenName{"all_commands_law34.haptics", 34}, GoldenName{"all_commands_law35.haptics", 35},
         GoldenName{"all_commands_law36.haptics", 36}, GoldenName{"all_commands_law37.haptics", 37},
         GoldenName{"all_commands_law38.haptics", 38}, GoldenName{"all_commands_law39.haptics", 39},
-        GoldenName{"all_commands_law40.haptics", 40}),
+        GoldenName{"all_commands_law40.haptics", 40}, GoldenName{"all_commands_law41.haptics", 41}),
     [](const auto& file) {
       const std::string name = file.param.file;
       return name.substr(0, name.find('.'));

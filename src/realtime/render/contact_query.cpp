@@ -68,6 +68,7 @@ void ContactQuery::beginTick(const SceneAtTime& now, const SceneAtTime& before, 
   overflowed_ = false;
   work_ = 0;
   facetCasts_ = 0;
+  overlappedTriangleCount_ = 0;
   gatheredBefore_ = false;
   longestStep_m_ = std::numeric_limits<double>::infinity();
   if (now.scene == before.scene) return;

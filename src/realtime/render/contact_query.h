@@ -182,7 +182,10 @@ class ContactQuery {
   /// With `closesGaps` it passes none that the ball does not pass.
   double freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps = false) noexcept;
   /// From now on, casts move a point tool instead of the tool: with a ball, its centre.
-  void castPointTool(bool point) noexcept { pointTool_ = point; }
+  void castPointTool(bool point) noexcept {
+    pointTool_ = point;
+    overlappedTriangleCount_ = 0;
+  }
   /// Of the ball that casts move against a facet.
   double radiusAt(const Facet& f) const noexcept {
     return pointTool_ ? std::min(f.radius, 0.5 * kGapTolerance_m) : f.radius;
@@ -307,6 +310,13 @@ class ContactQuery {
   bool castGathered(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtFacets(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool castAtNear(const Path& path, int only, ObjectHit& hit) noexcept;
+  bool isOverlapped(const Facet& f, const Vec3& p, double distance2) const noexcept;
+  bool isOverlapped(const Facet& f, const Vec3& p) const noexcept;
+  bool noteOverlap(const Facet& f, const FacetCache::TriangleId& id, const Path& path,
+                   double distance2) noexcept;
+  bool castGrowing(Facet f, const Path& path, double latest, ObjectHit& hit) const noexcept;
+  bool meetsGoingOn(Facet f, const Path& path, double latest, ObjectHit& hit) const noexcept;
   void considerGathered(int i, const Path& path, int only, ObjectHit& best, bool& found) noexcept;
   bool castAtEach(const Path& path, int only, ObjectHit& hit) noexcept;
   bool castInSteps(const Vec3& p, const Vec3& d, double begin, double end, int only, ObjectHit& hit) noexcept;
@@ -364,8 +374,16 @@ class ContactQuery {
   // Of the present cast of a point tool; -1: not known yet.
   mutable std::array<std::uint16_t, FacetCache::kMaxFacets> overlapped_;
   mutable int overlappedCount_ = -1;
-  std::uint64_t passable_ = 0;  // objects that the present cast does not meet
-  bool pointTool_ = false;      // casts move the centre of the tool
+  // Of a ball, in this tick: the place of the last cast, what the ball overlaps there, and how far the
+  // nearest of that is.
+  Vec3 overlappedFrom_ = Vec3::Zero();
+  int overlappedOnly_ = -1;  // the object that was cast at; -1: all
+  int overlappedTriangleCount_ = 0;
+  std::array<FacetCache::TriangleId, FacetCache::kMaxTriangles> overlappedTriangles_;
+  double nearestOverlapped2_ = 0;  // m^2
+  bool cameFromBehind_ = false;    // the present cast heeds it
+  std::uint64_t passable_ = 0;     // objects that the present cast does not meet
+  bool pointTool_ = false;         // casts move the centre of the tool
 };
 
 template <class Visit>

@@ -96,14 +96,23 @@ void ContactQuery::considerFacet(const Facet& f, const Path& path, ObjectHit& be
                                  bool gathered) const noexcept {
   ObjectHit hit;
   const double latest = found ? best.stop : path.end;
-  if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
-  if (gathered && !meetsBeside(f, path, hit)) return;
+  const bool overlapped = cameFromBehind_ && isOverlapped(f, path.p);
+  if (overlapped) {
+    if (!castGrowing(f, path, latest, hit)) return;
+  } else {
+    if (!castTool(f, path, latest, hit) || hit.stop > latest) return;
+    if (gathered && !meetsBeside(f, path, hit)) return;
+  }
   hit.object = f.object;
   hit.triangle = f.triangle;
-  const auto rank = [this](const ObjectHit& h) {
-    return std::tuple(h.stop, -h.depth, h.object < 0 ? h.object : object(h.object).state->id, h.triangle);
+  const auto isFirst = [&] {
+    const auto rank = [this](const ObjectHit& h) {
+      return std::tuple(h.stop, -h.depth, h.object < 0 ? h.object : object(h.object).state->id, h.triangle);
+    };
+    return !found || rank(hit) < rank(best);
   };
-  if (found && !(rank(hit) < rank(best))) return;
+  if (!isFirst()) return;
+  if (cameFromBehind_ && !overlapped && (!meetsGoingOn(f, path, latest, hit) || !isFirst())) return;
   best = hit;
   found = true;
 }
@@ -164,7 +173,62 @@ double ContactQuery::freeOfFaces(const Vec3& p, const Vec3& g, bool closesGaps) 
   return free;
 }
 
+// Whether a ball at p came through a one-sided face from behind and is not out of it yet. What moves pushes a
+// ball out that it gets into; so does a fan whose triangles are joined in another way than before.
+bool ContactQuery::isOverlapped(const Facet& f, const Vec3& p, double distance2) const noexcept {
+  constexpr double kSlight = 1e-3;  // of the radius: twice what joining may move a face
+  const double overlap = (1 - kSlight) * f.radius;
+  return f.object >= 0 && distance2 < overlap * overlap && object(f.object).rests() &&
+         isTouchable(f, faces(), p);
+}
+
+bool ContactQuery::isOverlapped(const Facet& f, const Vec3& p) const noexcept {
+  return isOverlapped(f, p, (nearestPointOf(f, p) - p).squaredNorm());
+}
+
+// For the faces that it overlaps, a ball that came from behind is as large as fits before the nearest of
+// them: it grows as it comes out, and its centre gets no nearer. What it rises from does not hold it at all.
+bool ContactQuery::castGrowing(Facet f, const Path& path, double latest, ObjectHit& hit) const noexcept {
+  const double rise = f.normal.dot(path.d);
+  if (faces() == scene::TouchableFaces::back ? rise <= 0 : rise >= 0) return false;
+  f.radius = std::max(0.0, std::sqrt(nearestOverlapped2_) - f.skin);
+  ++facetCasts_;
+  return castBall(f, faces(), path.p, path.d, 1, latest, hit) && hit.stop <= latest;
+}
+
+// The same for a face that it meets where an overlapped one goes on in it. False when that does not hold it.
+bool ContactQuery::meetsGoingOn(Facet f, const Path& path, double latest, ObjectHit& hit) const noexcept {
+  constexpr double kGap2 = kGapTolerance_m * kGapTolerance_m;
+  if (!hit.atEdge || f.object < 0 || !object(f.object).rests()) return true;
+  const Vec3 edge = hit.halfSpace.anchor;
+  for (int i = 0; i < overlappedTriangleCount_; ++i) {
+    const Facet* const g = facetOf(overlappedTriangles_[static_cast<std::size_t>(i)]);
+    ++work_;
+    if (g == nullptr || std::abs(g->normal.dot(edge - g->a)) > kGapTolerance_m) continue;
+    work_ += kBoxVisit;
+    if ((nearestPointOf(*g, edge) - edge).squaredNorm() <= kGap2) return castGrowing(f, path, latest, hit);
+  }
+  return true;
+}
+
+// What a ball overlaps is found by the first cast from a place, as if it overlapped nothing.
 bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) noexcept {
+  const bool known = overlappedTriangleCount_ > 0 && overlappedFrom_ == path.p && overlappedOnly_ == only;
+  if (!known) {
+    overlappedTriangleCount_ = 0;
+    overlappedFrom_ = path.p;
+    overlappedOnly_ = only;
+    const bool found = castAtNear(path, only, hit);
+    if (hit.unexamined || overlappedTriangleCount_ == 0) return found;
+    hit = {};
+  }
+  cameFromBehind_ = true;
+  const bool found = castAtNear(path, only, hit);
+  cameFromBehind_ = false;
+  return found;
+}
+
+bool ContactQuery::castAtNear(const Path& path, int only, ObjectHit& hit) noexcept {
   cache_.moveTo(path.p + path.begin * path.d);
   ++cast_;
   bool found = false;
@@ -187,7 +251,10 @@ bool ContactQuery::castAtTriangles(const Path& path, int only, ObjectHit& hit) n
   // no exact test.
   constexpr double kAtOnce = 0.01;  // of the radius
   if (lastBlocker_ < cache_.size()) considerGathered(lastBlocker_, path, only, hit, found);
-  if (way().norm() > kAtOnce * radius_ && !considerNear(Vec3::Zero())) return endUnexamined(path, hit);
+  if (way().norm() > kAtOnce * radius_) {
+    if (!considerNear(Vec3::Zero())) return endUnexamined(path, hit);
+    if (!cameFromBehind_ && overlappedTriangleCount_ > 0) return found;
+  }
   if (!considerNear(way())) return endUnexamined(path, hit);
   return found;
 }
@@ -203,7 +270,13 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   if (cache_.lowerBound(i, ahead) > touching) return;
   const Facet* const f = facetOf(id);
   if (f == nullptr) return cache_.exclude(i);
-  if (cache_.refine(i, nearestPointOf(*f, path.p + path.begin * path.d), ahead) > touching) {
+  const Vec3 start = path.p + path.begin * path.d;
+  const Vec3 foot = nearestPointOf(*f, start);
+  if (cache_.refine(i, foot, ahead) > touching) {
+    work_ += kBoxVisit;
+    return;
+  }
+  if (!cameFromBehind_ && noteOverlap(*f, id, path, (foot - start).squaredNorm())) {
     work_ += kBoxVisit;
     return;
   }
@@ -211,8 +284,20 @@ void ContactQuery::considerGathered(int i, const Path& path, int only, ObjectHit
   if (found && best.stop < latest) lastBlocker_ = i;
 }
 
+// Whether the ball overlaps this face or another: then this cast is not the one that counts.
+bool ContactQuery::noteOverlap(const Facet& f, const FacetCache::TriangleId& id, const Path& path,
+                               double distance2) noexcept {
+  if (path.begin > 0 || pointTool_ || faces() == scene::TouchableFaces::both) return false;
+  const bool first = overlappedTriangleCount_ == 0;
+  if (!isOverlapped(f, path.p, distance2)) return !first;
+  nearestOverlapped2_ = first ? distance2 : std::min(nearestOverlapped2_, distance2);
+  overlappedTriangles_[static_cast<std::size_t>(overlappedTriangleCount_++)] = id;
+  return true;
+}
+
 // Where more triangles meet than can be gathered: examines them one after the other.
 bool ContactQuery::castAtEach(const Path& path, int only, ObjectHit& hit) noexcept {
+  overlappedTriangleCount_ = 0;
   bool found = false;
   if (only < 0 && planes_ != nullptr) {
     for (const PlacedPlane& plane : *planes_) considerFacet(plane.facet, path, hit, found);
@@ -288,9 +373,11 @@ bool ContactQuery::castUpTo(double share, const Vec3& p, const Vec3& g, ObjectHi
 bool ContactQuery::castPast(std::uint64_t passable, const Vec3& p, const Vec3& g, ObjectHit& hit) noexcept {
   // What it passes may have more triangles on its way than there is room for.
   cache_.invalidate();
+  overlappedTriangleCount_ = 0;
   passable_ = passable;
   const bool found = cast(p, g, hit);
   passable_ = 0;
+  overlappedTriangleCount_ = 0;
   cache_.invalidate();
   return found;
 }

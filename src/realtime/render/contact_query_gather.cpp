@@ -41,6 +41,7 @@ void ContactQuery::forget() noexcept {
 }
 
 void ContactQuery::dropStaleFacets() noexcept {
+  overlappedTriangleCount_ = 0;  // the objects may have other indices
   if (gatheredGeneration_ == generation_ && sameObjects()) return;
   cache_.invalidate();
   unfitCount_ = 0;

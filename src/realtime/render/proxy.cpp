@@ -27,7 +27,7 @@ bool depthsOf(const ObjectHit* hits, int count, double toolRadius_m, const Vec3&
   std::array<HalfSpace, kMaxActive> halfSpaces;
   for (int i = 0; i < count; ++i) {
     halfSpaces[static_cast<std::size_t>(i)] = hits[i].halfSpace;
-    halfSpaces[static_cast<std::size_t>(i)].standoff = toolRadius_m;
+    halfSpaces[static_cast<std::size_t>(i)].standoff = std::min(toolRadius_m, hits[i].halfSpace.standoff);
   }
   const bool room = depthsBelow(halfSpaces.data(), count, hip, depths);
   Vec3 normal = Vec3::Zero();
@@ -364,7 +364,7 @@ bool Proxy::restoreConstraints(const Vec3& hip, ActiveSet& active) const noexcep
   for (int i = 0; i < lastCount_; ++i) {
     const LastConstraint& last = lastConstraints_[static_cast<std::size_t>(i)];
     const HalfSpace& face = last.halfSpace;
-    if (face.normal.dot(hip - face.anchor) >= toolRadius_) continue;
+    if (face.normal.dot(hip - face.anchor) >= std::min(toolRadius_, face.standoff)) continue;
     for (int k = 0; k < query_.objectCount(); ++k) {
       const PlacedObject& object = query_.object(k);
       if (object.state->id != last.object || !object.rests()) continue;

@@ -78,7 +78,7 @@ struct RenderOptions {
 
 /// Number of the laws from contact to force. It changes when the same ticks give other forces on purpose, so
 /// that a re-rendering can name the reason (docs/decisions/0009-stiffness-and-friction.md).
-inline constexpr std::uint32_t kForceLaw = 40;
+inline constexpr std::uint32_t kForceLaw = 41;
 
 /// Keeps the proxy from tick to tick. Construct it outside the loop; step() is realtime: noexcept, no
 /// allocation, no lock. One per servo; not thread-safe.

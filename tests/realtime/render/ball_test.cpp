@@ -143,5 +143,92 @@ TEST_P(BallTest, popthrough_lets_go_at_its_force_in_both_directions) {
   }
 }
 
+// A ball of 3 mm that came through a surface from behind.
+constexpr RenderOptions kLargeBall{.toolRadius_m = 0.003};
+
+struct SheetForm {
+  const char* name;
+  double (*z)(double x, double y);
+};
+const std::vector<SheetForm> kSheetForms{{"flat", [](double, double) { return 0.0; }},
+                                         {"hill", [](double x, double y) { return -25 * (x * x + y * y); }},
+                                         {"bowl", [](double x, double y) { return 25 * (x * x + y * y); }},
+                                         {"ridge", [](double x, double) { return -0.3 * std::abs(x); }},
+                                         {"valley", [](double x, double) { return 0.3 * std::abs(x); }}};
+const std::vector<Vec3> kWaysOut{{0, 0, 1}, {0.5, 0.2, 1}, {1, -0.3, 0.5}, {-0.4, 1, 0.25}, {1, 0.1, 0.12}};
+
+// It overlaps faces in front of which its centre is. They do not hold it, and afterwards all of them hold it
+// from the front.
+TEST_P(BallTest, what_came_from_behind_is_not_held) {
+  for (const SheetForm& sheet : kSheetForms) {
+    for (const double friction : {0.0, 0.8}) {
+      scene = SceneFixture();
+      scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+      add(heightField(0.03, 60, sheet.z, 0.3), surface(1000, friction, friction));
+      for (const Vec3& way : kWaysOut) {
+        SCOPED_TRACE(std::string(sheet.name) + (friction > 0 ? ", friction, " : ", ") +
+                     std::to_string(way.z()));
+        const Vec3 through(0.0011, -0.0007, sheet.z(0.0011, -0.0007));
+        start(through - 0.005 * way, kLargeBall);
+        double most_N = 0;
+        const auto book = [&](const Rendering& r) { most_N = std::max(most_N, r.force_N.norm()); };
+        to(through + 0.004 * way, 0.02, book);
+        to(hip() + Vec3(0, 0, 0.012), 0.02, book);
+        EXPECT_LE(most_N, 0.02);
+        // Down again: the ball rests a radius above the surface.
+        const Vec3 above(0.0004, 0.0003, 0.0025);
+        to({above.x(), above.y(), hip().z()}, 0.05);
+        const Rendering& r = to(above, 0.02);
+        EXPECT_GT(r.force_N.z(), 0.3);
+        const Vec3 rest = proxy();
+        const auto v = scene.snapshot()->objects[0]->mesh->vertices;
+        double nearest = 1;
+        for (const auto& x : *v) {
+          const Vec3 at = x.cast<double>() / GetParam().worldUnitsPerMetre;
+          nearest = std::min(nearest, (at - rest).norm());
+        }
+        EXPECT_GE(nearest, 0.003 - 1e-7);
+      }
+    }
+  }
+}
+
+// A hand that turns back before the ball is out meets the surface where the ball is, without a jump: no
+// deeper, and no higher.
+TEST_P(BallTest, what_turns_back_half_way_is_held_where_it_is) {
+  for (const SheetForm& sheet : kSheetForms) {
+    scene = SceneFixture();
+    scene.setWorldUnitsPerMetre(GetParam().worldUnitsPerMetre);
+    add(heightField(0.03, 60, sheet.z, 0.3), surface());
+    for (const double top : {0.0003, 0.0012, 0.0027}) {
+      SCOPED_TRACE(std::string(sheet.name) + ", " + std::to_string(top));
+      const Vec3 foot(0.0011, -0.0007, sheet.z(0.0011, -0.0007));
+      start(foot - Vec3(0, 0, 0.005), kLargeBall);
+      to(foot + Vec3(0, 0, top), 0.02);
+      Vec3 last = Vec3::Zero();
+      double work_J = 0;
+      Vec3 place = hip();
+      to(foot - Vec3(0, 0, 0.002), 0.02, [&](const Rendering& r) {
+        EXPECT_LE(r.force_N.norm(), 1000 * (foot.z() + top - hip().z()) + 1e-3);
+        work_J += 0.5 * (last + r.force_N).dot(hip() - place);
+        last = r.force_N;
+        place = hip();
+        EXPECT_GE(proxy().z() - sheet.z(proxy().x(), proxy().y()), -2e-5);
+      });
+      EXPECT_GT(last.z(), 1.5);
+      if (sheet.z(1, 1) == 0) {
+        EXPECT_NEAR(last.z(), 1000 * (top + 0.002), 1e-4);
+      }
+      to(foot + Vec3(0, 0, 0.012), 0.02, [&](const Rendering& r) {
+        work_J += 0.5 * (last + r.force_N).dot(hip() - place);
+        last = r.force_N;
+        place = hip();
+      });
+      EXPECT_EQ(last.norm(), 0);
+      EXPECT_LE(work_J, 1e-6);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hapticd::realtime::fixture

