@@ -203,9 +203,10 @@ void run(Options options) {
   std::jthread objects;
   if (!options.readOnly) {
     control.emplace(client, bridge.participant, bridge.frame, bridge.base);
-    if (!names.empty())
+    if (!names.empty()) {
       objects =
           std::jthread([&](const std::stop_token& stop) { serveObjects(stop, options, bridge, token); });
+    }
   }
   ros2::log("topics below " + options.nameSpace + " in DDS domain " + std::to_string(options.domain) +
             (options.network ? ", on the network" : ", on this machine") + "; Ctrl-C ends");

@@ -214,6 +214,21 @@ TEST_F(SameForce, EvdevInItsPlane) {
   EXPECT_TRUE(eventually([&] { return joystick.isIdle(); }));
 }
 
+// When the recording began, on the clock of the ticks. That stands in no report: it is found from the lowest
+// place.
+base::Nanos beginOf(const device::HandPath& recording, const std::vector<TickReport>& ticks) {
+  const auto lower = [](const TickReport& a, const TickReport& b) { return a.hand_m[2] < b.hand_m[2]; };
+  const TickReport& lowest = *std::min_element(ticks.begin(), ticks.end(), lower);
+  const Vec3 place(lowest.hand_m[0], lowest.hand_m[1], lowest.hand_m[2]);
+  base::Nanos best = 0;
+  double nearest = 1;
+  for (base::Nanos at = 0; at <= recording.duration(); at += 1000) {
+    const double distance = (recording.at(at).position_m - place).norm();
+    if (distance < nearest) nearest = distance, best = at;
+  }
+  return lowest.tickTime.count() - best;
+}
+
 // What is reported is the recording, tick by tick, and the force that of the simulated device at the same
 // places.
 TEST_F(SameForce, ReplayIsItsRecording) {
@@ -234,6 +249,7 @@ TEST_F(SameForce, ReplayIsItsRecording) {
   serve({"--device", "replay", "--hand", work.file("hand.csv")}, {});
   std::vector<TickReport> ticks;
   const auto inAir = [](const TickReport& tick) { return tick.hand_m[2] > 0.0015; };
+  const auto isBehind = [&](const TickReport& tick) { return inAir(tick) && tick.proxy_m != tick.hand_m; };
   visitor->client().onTick([&](const TickReport& report) { ticks.push_back(report); });
   visitor->client().subscribe(Reports::tick, 1000);
   // Whole strokes, until the guard took nothing from one of them: a late tick costs half a second of ramp.
@@ -246,11 +262,10 @@ TEST_F(SameForce, ReplayIsItsRecording) {
     if (ticks.empty()) return false;
     // Sheets that appeared above the hand, or that it got behind while the servo stood still, hold it from
     // below. The same sheets sent again hold it, too, so they go first.
-    const bool behind = inAir(ticks.back()) && ticks.back().proxy_m != ticks.back().hand_m;
-    if (behind && !gone) {
+    if (isBehind(ticks.back()) && !gone) {
       visitor->client().resetScene();
       gone = true;
-    } else if (!behind && gone && inAir(ticks.back())) {
+    } else if (gone && inAir(ticks.back()) && !isBehind(ticks.back())) {
       scene.upload(visitor->client());
       gone = false;
       ticks.clear();
@@ -262,8 +277,7 @@ TEST_F(SameForce, ReplayIsItsRecording) {
     const auto gap = [](const TickReport& a, const TickReport& b) {
       return b.tick != a.tick + 1 || b.revision != a.revision || b.tickTime - a.tickTime > 3ms;
     };
-    const bool startsBehind = ticks[0].proxy_m != ticks[0].hand_m;
-    if (startsBehind || std::adjacent_find(ticks.begin(), ticks.end(), gap) != ticks.end()) {
+    if (isBehind(ticks[0]) || std::adjacent_find(ticks.begin(), ticks.end(), gap) != ticks.end()) {
       ticks.clear();
       return false;
     }
@@ -282,17 +296,8 @@ TEST_F(SameForce, ReplayIsItsRecording) {
     return whole || HasFailure();
   })) << server->log();
   ASSERT_TRUE(whole);
-  // When the recording began stands in no report: it is found from the lowest place.
-  const auto lower = [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); };
-  const auto lowest = std::min_element(places.begin(), places.end(), lower) - places.begin();
-  const auto lowestTick = ticks[static_cast<std::size_t>(lowest)].tickTime.count();
   const base::Nanos round = recording->duration() + 1;
-  base::Nanos begin = 0;
-  double nearest = 1;
-  for (base::Nanos at = 0; at < round; at += 1000) {
-    const double distance = (recording->at(at).position_m - places[static_cast<std::size_t>(lowest)]).norm();
-    if (distance < nearest) nearest = distance, begin = lowestTick - at;
-  }
+  const base::Nanos begin = beginOf(*recording, ticks);
   double far_m = 0;
   double most_N = 0;
   for (std::size_t i = 0; i < ticks.size(); ++i) {

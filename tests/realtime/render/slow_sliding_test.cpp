@@ -233,32 +233,5 @@ TEST(GrooveFriction, smooth_wall_bears_none) {
   }
 }
 
-// Walls that yield bear less than their springs, and their resultant points elsewhere: with the friction
-// beside it, the force is still no more than the spring from hand to proxy.
-TEST(GrooveFriction, of_yielding_walls_stays_within_the_spring) {
-  TriangleMesh walls;
-  walls.vertices = {
-      {-0.0158807207F, 0.000966840016F, -0.00533259986F},  {0.000422640005F, 0.00444664015F, -0.0136460001F},
-      {-0.0032414F, 0.000477480004F, -0.00295027997F},     {-0.0123740397F, -0.00540103996F, -0.00720928004F},
-      {-0.000187640006F, -0.00593459979F, 0.00196831999F}, {-0.0199999996F, -0.0134831602F, -0.0199999996F}};
-  walls.triangles = {{0, 1, 2}, {3, 1, 4}, {2, 5, 3}, {0, 4, 2}};
-  SceneFixture scene;
-  scene.faces = scene::TouchableFaces::back;
-  scene::Surface s = surface(504.408, 0.250534, 0.030246);
-  s.popthrough_N = 1;
-  scene.add(walls, s);
-  Hand hand(scene.snapshot(), {.toolRadius_m = 0.002});
-  double most_N = 0;
-  for (const Vec3& hip :
-       {Vec3(-0.02, -0.02, -0.02), Vec3(-0.00843296, 0.00286272, -0.00904008),
-        Vec3(-0.00655404, 0.00067164, -0.0063221), Vec3(-0.00467512, -0.00151944, -0.00360412),
-        Vec3(-0.005700405, -0.00810138, -0.00459359)}) {
-    const Rendering& r = hand.at(hip);
-    EXPECT_LE(r.force_N.norm(), s.stiffness_N_per_m * (hip - r.proxy_m).norm() * (1 + 1e-6));
-    most_N = std::max(most_N, r.force_N.norm());
-  }
-  EXPECT_GT(most_N, 0.5);
-}
-
 }  // namespace
 }  // namespace hapticd::realtime::fixture
